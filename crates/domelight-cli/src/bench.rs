@@ -11,9 +11,9 @@ use crate::error::{Interrupted, UsageError};
 use crate::files;
 use crate::interrupt;
 use crate::output::print;
-use crate::parse::Size;
 use crate::scene::start_threads;
 use crate::terminal::Terminal;
+use domelight_lab::job::value::Size;
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &BenchArguments, quiet: bool) -> Result<()> {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
+use domelight::render::RenderSettings;
 use domelight_lab::Host as _;
 use domelight_lab::compare::{Comparison, ComparisonResult, ComparisonSettings, read_pictures};
 use domelight_lab::measure::{Cache, Reference};
@@ -12,10 +13,10 @@ use crate::command_line;
 use crate::error::UsageError;
 use crate::files;
 use crate::interrupt;
+use crate::job::resolve_scene;
 use crate::memory;
 use crate::output::print_json;
-use crate::parse::Size;
-use crate::scene::start_threads;
+use crate::scene::{load, one_sample, start_threads};
 use crate::terminal::Terminal;
 
 /// Runs the subcommand.
@@ -24,9 +25,12 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     for path in [Some(&arguments.output), arguments.json.as_ref()].into_iter().flatten() {
         files::writes(path)?;
     }
-    let Size { width, height } = arguments.scene.camera.size;
+    let CompareArguments { scene, pixel, given, .. } = arguments;
+    let (scene, pixel) = &resolve_scene(scene, pixel, given, quiet)?;
+    let render = one_sample(scene, pixel);
+    let RenderSettings { width, height, .. } = render;
     memory::allow_picture(width, height, memory::compared_pixel(arguments.strategies.len()))?;
-    start_threads(arguments.pixel.threads)?;
+    start_threads(arguments.threads.threads)?;
     interrupt::flag();
     let host = &Terminal { quiet };
     let loading = interrupt::nothing_to_keep(interrupt::ENDED);
@@ -35,9 +39,9 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     let folder = arguments.pictures.as_deref();
     let pictures =
         folder.map(|folder| read_pictures(folder, host)).transpose()?.unwrap_or_default();
-    let scene = arguments.scene.load(quiet)?.build(host)?;
+    let scene = load(scene, quiet)?.build(host)?;
     drop(loading);
-    let mut comparison = Comparison::new(scene.view(), arguments.settings());
+    let mut comparison = Comparison::new(scene.view(), arguments.settings(render));
     for strategy in &arguments.strategies {
         comparison.add_named(strategy.clone())?;
     }
@@ -70,10 +74,10 @@ pub(crate) fn cache(no_cache: bool, folder: Option<&Path>, host: &Terminal) -> O
 }
 
 impl CompareArguments {
-    fn settings(&self) -> ComparisonSettings {
+    fn settings(&self, render: RenderSettings) -> ComparisonSettings {
         let usual = ComparisonSettings::default();
         ComparisonSettings {
-            render: self.scene.render_settings(&self.pixel, 1),
+            render,
             budget: self.budget,
             n_seeds: self.seeds,
             exposure: self.exposure,

@@ -8,6 +8,7 @@ use crate::args::figures::FiguresArguments;
 use crate::files;
 use crate::interrupt;
 use crate::output::print_json;
+use crate::scene::without_camera;
 use crate::terminal::Terminal;
 
 /// Runs the subcommand.
@@ -15,7 +16,7 @@ pub(crate) fn run(arguments: &FiguresArguments, quiet: bool) -> Result<()> {
     interrupt::flag();
     let settings = FigureSettings {
         scene: arguments.scene.clone(),
-        environment: arguments.environment.settings_without_camera()?,
+        environment: without_camera(&arguments.light)?.clone(),
         quick: arguments.quick,
         seed: arguments.seed,
     };

@@ -1,12 +1,14 @@
 //! The files that the program reads and writes. A command declares them here before its work, so that no result overwrites
 //! an input or another result.
 
+use std::collections::HashSet;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use anyhow::Result;
 use domelight::files::{self, FileConflict, FileLedger, WriteSeek};
+use domelight::fingerprint::Fingerprinter;
 use domelight::picture::PictureError;
 
 use crate::error::UsageError;
@@ -26,6 +28,25 @@ fn with_ledger<T>(f: impl FnOnce(&mut FileLedger) -> T) -> T {
 /// If it is declared as written.
 pub(crate) fn reads(path: &Path) -> Result<(), FileConflict> {
     with_ledger(|ledger| ledger.read(path))
+}
+
+/// The files that were read so far, in their order.
+pub(crate) fn inputs() -> Vec<PathBuf> {
+    let mut paths =
+        with_ledger(|ledger| ledger.inputs().map(Path::to_path_buf).collect::<Vec<_>>());
+    let mut seen = HashSet::new();
+    paths.retain(|path| seen.insert(path.clone()));
+    paths
+}
+
+/// The fingerprint of a file's bytes; `None` if it is no file that can be read again.
+pub(crate) fn fingerprint(path: &Path) -> Option<String> {
+    if waits(path) {
+        return None;
+    }
+    let mut fingerprinter = Fingerprinter::default();
+    fingerprinter.file(path).ok()?;
+    Some(fingerprinter.finish().to_string())
 }
 
 /// Declares a result of another run.

@@ -11,9 +11,9 @@ use crate::command_line;
 use crate::error::UsageError;
 use crate::files;
 use crate::interrupt;
+use crate::job::resolve_scene;
 use crate::output::print_json;
-use crate::parse::Size;
-use crate::scene::start_threads;
+use crate::scene::{load, one_sample, start_threads};
 use crate::terminal::Terminal;
 
 /// Runs the subcommand.
@@ -30,15 +30,16 @@ pub(crate) fn run(arguments: &InspectArguments, quiet: bool) -> Result<()> {
         }
     };
     files::writes(output)?;
-    start_threads(arguments.sampling.threads)?;
+    let InspectArguments { scene, sampling, given, .. } = arguments;
+    let (scene, sampling) = &resolve_scene(scene, sampling, given, quiet)?;
+    let settings = one_sample(scene, sampling);
+    start_threads(arguments.threads.threads)?;
     interrupt::flag();
     let host = &Terminal { quiet };
     let loading = interrupt::nothing_to_keep(interrupt::ENDED);
-    let scene = arguments.scene.load(quiet)?.build(host)?;
+    let scene = load(scene, quiet)?.build(host)?;
     drop(loading);
-    let Size { width, height } = arguments.scene.camera.size;
-    let pixel = arguments.pixel.unwrap_or([width / 2, height / 2]);
-    let settings = arguments.scene.render_settings(&arguments.sampling, 1);
+    let pixel = arguments.pixel.unwrap_or([settings.width / 2, settings.height / 2]);
     let mut inspection = Inspection::new(scene.view(), settings, pixel, command_line::command())?;
     for strategy in &arguments.strategies {
         inspection.add_named(strategy, host)?;

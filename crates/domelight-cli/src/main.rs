@@ -18,6 +18,7 @@ mod figures;
 mod files;
 mod inspect;
 mod interrupt;
+mod job;
 mod lights;
 mod map_picture;
 mod memory;
@@ -59,6 +60,7 @@ fn main() -> ExitCode {
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
+        Command::Schema => output::print_json(&domelight_lab::job::schema()),
         Command::Tone(arguments) => tone::run(&arguments, quiet),
         Command::Figures(arguments) => figures::run(&arguments, quiet),
         Command::Completions(arguments) => shell::completions(&arguments),

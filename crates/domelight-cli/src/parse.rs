@@ -3,126 +3,10 @@
 use std::str::FromStr;
 use std::time::Duration;
 
-use domelight::math::{Vec3, vec3};
-
-/// A value that could not be read, and what it should look like.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{text}' is not {expected}")]
-pub(crate) struct BadValue {
-    text: String,
-    expected: &'static str,
-}
+use domelight_lab::job::value::BadValue;
 
 fn bad(text: &str, expected: &'static str) -> BadValue {
-    BadValue { text: text.to_owned(), expected }
-}
-
-/// A picture's size, `WxH`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Size {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-}
-
-impl Size {
-    /// The longest edge of a picture.
-    const MOST: usize = 65_536;
-
-    /// The most pixels of a picture, whose sums take some 120 bytes each.
-    const MOST_PIXELS: usize = 1 << 28;
-}
-
-impl FromStr for Size {
-    type Err = BadValue;
-
-    fn from_str(s: &str) -> Result<Self, BadValue> {
-        let expected = "a size such as 800x600, each from 1 to 65536, with at most 2^28 pixels";
-        let (w, h) = s.split_once(['x', 'X']).ok_or_else(|| bad(s, expected))?;
-        match (w.parse(), h.parse()) {
-            (Ok(width), Ok(height))
-                if (1..=Self::MOST).contains(&width)
-                    && (1..=Self::MOST).contains(&height)
-                    && width * height <= Self::MOST_PIXELS =>
-            {
-                Ok(Self { width, height })
-            }
-            _ => Err(bad(s, expected)),
-        }
-    }
-}
-
-/// A point or a direction, `X,Y,Z`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Triple(pub(crate) Vec3);
-
-impl FromStr for Triple {
-    type Err = BadValue;
-
-    fn from_str(s: &str) -> Result<Self, BadValue> {
-        let expected = "three numbers such as 0,1.5,-4";
-        let numbers: Result<Vec<f32>, _> = s.split(',').map(|x| x.trim().parse()).collect();
-        match numbers.as_deref() {
-            Ok(&[x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => {
-                Ok(Self(vec3(x, y, z)))
-            }
-            _ => Err(bad(s, expected)),
-        }
-    }
-}
-
-/// How an environment is turned.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Rotation {
-    /// So that its key light falls on what the camera sees.
-    Auto,
-    /// By an angle.
-    Degrees(f32),
-}
-
-impl Rotation {
-    /// The angle, if one was given.
-    pub(crate) fn degrees(self) -> Option<f32> {
-        match self {
-            Self::Auto => None,
-            Self::Degrees(degrees) => Some(degrees),
-        }
-    }
-}
-
-impl FromStr for Rotation {
-    type Err = BadValue;
-
-    fn from_str(s: &str) -> Result<Self, BadValue> {
-        if s == "auto" {
-            return Ok(Self::Auto);
-        }
-        match s.parse::<f32>() {
-            Ok(degrees) if degrees.is_finite() => Ok(Self::Degrees(degrees)),
-            _ => Err(bad(s, "an angle in degrees or auto")),
-        }
-    }
-}
-
-/// Samples of the environment and of the BRDF, `M:N`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Split {
-    pub(crate) environment: u32,
-    pub(crate) brdf: u32,
-}
-
-impl FromStr for Split {
-    type Err = BadValue;
-
-    fn from_str(s: &str) -> Result<Self, BadValue> {
-        let expected = "a split such as 3:1 (environment:BRDF samples, not both zero, up to 65536)";
-        let parts = s.split_once(':').and_then(|(m, n)| Some((m.parse().ok()?, n.parse().ok()?)));
-        match parts {
-            Some((environment, brdf)) if (1..=65_536u32).contains(&u32::max(environment, brdf)) => {
-                Ok(Self { environment, brdf })
-            }
-            _ => Err(bad(s, expected)),
-        }
-    }
+    BadValue::new(text, expected)
 }
 
 /// A span of time: `90`, `30s`, `500ms`, `5m` or `2h`.
@@ -203,29 +87,12 @@ impl FromStr for Frames {
     }
 }
 
-/// A finite number that is not negative.
-pub(crate) fn not_negative(s: &str) -> Result<f32, BadValue> {
-    match s.parse::<f32>() {
-        Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
-        Ok(x) if x == f32::INFINITY => Err(bad(s, "a number up to 3.4e38")),
-        _ => Err(bad(s, "a number that is not negative")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn good_and_bad_values() {
-        assert_eq!("640x480".parse(), Ok(Size { width: 640, height: 480 }));
-        assert!(
-            ["", "640", "0x1", "1x65537", "ax3", "65536x65536"]
-                .iter()
-                .all(|s| s.parse::<Size>().is_err())
-        );
-        assert_eq!("1, -2,3e1".parse(), Ok(Triple(vec3(1.0, -2.0, 30.0))));
-        assert!(["1,2", "1,2,nan", "a,b,c"].iter().all(|s| s.parse::<Triple>().is_err()));
         assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
         assert_eq!(duration("500ms"), duration("0.5"));
         assert!(
@@ -238,10 +105,5 @@ mod tests {
         assert!(["5-3", "-", "a-b"].iter().all(|s| s.parse::<Tiles>().is_err()));
         assert_eq!("3-5".parse(), Ok(Frames { first: 3, last: 5 }));
         assert!(["5-3", "-1", "a"].iter().all(|s| s.parse::<Frames>().is_err()));
-        assert_eq!("auto".parse(), Ok(Rotation::Auto));
-        assert_eq!("-30".parse(), Ok(Rotation::Degrees(-30.0)));
-        assert!(["", "x", "inf"].iter().all(|s| s.parse::<Rotation>().is_err()));
-        assert_eq!("3:1".parse(), Ok(Split { environment: 3, brdf: 1 }));
-        assert!(["0:0", "1", "-1:2", "1:2:3"].iter().all(|s| s.parse::<Split>().is_err()));
     }
 }

@@ -10,7 +10,7 @@ use domelight::strategy::PreparedStrategy;
 
 use crate::output::PicturePath;
 use crate::progress::RenderProgress;
-use crate::strategy::Job;
+use crate::strategy::RenderTask;
 use domelight_lab::scene::PreparedScene;
 
 /// Writes PNG output after one sample of each square of 2 × 2 pixels.
@@ -28,7 +28,7 @@ pub(crate) fn write(
     let camera = &view.camera.resized((whole_width, whole_height), (width, height));
     let progress = &RenderProgress::new("", 1, true, interrupted);
     let PreparedScene { scene, environment, .. } = view;
-    let job = Job { scene, camera, environment, settings, progress, render_run: None };
+    let job = RenderTask { scene, camera, environment, settings, progress, render_run: None };
     let layers = job.render(strategy)?.layers;
 
     let at = |x: usize, y: usize| y / 2 * width + x / 2;

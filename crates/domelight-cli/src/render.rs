@@ -13,19 +13,20 @@ use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::clock;
 use crate::error::{Interrupted, UsageError, status, warn};
 use crate::interrupt;
+use crate::job;
 use crate::memory;
 use crate::output::{self, PicturePath, print_progress, require_one_on_standard_output};
-use crate::parse::{Rotation, Size};
 use crate::preview;
 use crate::progress::RenderProgress;
 use crate::render_run::TryWriting;
 use crate::report::{RenderReport, Settings, StopReason, Timings};
-use crate::scene::start_threads;
-use crate::strategy::{Job, acceptance};
+use crate::scene::{load, start_threads};
+use crate::strategy::{RenderTask, acceptance};
 use crate::terminal::Terminal;
 use crate::tone::Shown;
 use crate::turntable::{Frame, Turntable};
 use domelight_lab::denoise::Denoiser;
+use domelight_lab::job::value::{Rotation, Text};
 use domelight_lab::scene::PreparedScene;
 use domelight_lab::{Stopwatch, refuse_repeating_points};
 
@@ -40,8 +41,10 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 }
 
 fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
-    let spec = arguments.strategy.spec()?;
-    refuse_repeating_points(spec, arguments.samples.spp)?;
+    let job = job::resolve(&arguments.job, &arguments.given, quiet)?;
+    let settings = job.settings();
+    let spec = job.sampling.strategy.0.spec;
+    refuse_repeating_points(spec, settings.n_samples)?;
     let outputs = arguments.output.paths()?;
     let turntable = arguments.turntable.turntable(&outputs)?;
     let outputs = turntable.as_ref().map_or(outputs, Turntable::outputs);
@@ -49,27 +52,23 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     outputs.iter().try_for_each(PicturePath::declare)?;
     if !arguments.render_run.is_part() {
         // Check the memory before loading. `render_run` checks again, with what it saves.
-        let Size { width, height } = arguments.scene.camera.size;
-        memory::allow_picture(width, height, memory::PIXEL)?;
+        memory::allow_picture(settings.width, settings.height, memory::PIXEL)?;
     }
-    start_threads(arguments.pixel.threads)?;
+    start_threads(arguments.threads.threads)?;
     // Before the work that would be in vain.
     let denoiser = arguments.output.denoise.then(Denoiser::load).transpose()?;
     let interrupted = interrupt::flag();
     let loading = interrupt::nothing_to_keep(arguments.render_run.code_of_an_early_end());
     let mut watch = Stopwatch::start();
 
-    let loaded = arguments.scene.load_for(quiet, turntable.is_some())?;
+    let mut scene_settings = job.scene_settings();
+    scene_settings.view.all_around = turntable.is_some();
+    let loaded = load(&scene_settings, quiet)?;
     let load = watch.lap();
 
     let view = &loaded.build(&Terminal { quiet })?;
     let PreparedScene { scene, camera, environment, probe, report, .. } = view;
-    let settings = &RenderSettings {
-        adaptive: !arguments.samples.no_adaptive,
-        target_error: arguments.samples.target_error,
-        passes: arguments.samples.passes.into(),
-        ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
-    };
+    let settings = &settings;
     let spec = spec.for_picture(scene, camera, environment, settings);
     memory::allow(&format!("the tables of {spec}"), PreparedStrategy::memory(spec, environment))?;
     if settings.target_error.is_some() && spec.draws_from_the_bsdf_alone() {
@@ -79,7 +78,10 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let strategy = &PreparedStrategy::new(spec, environment).with_context(|| probe.clone())?;
     let automatic = automatic_exposure(scene, camera, environment, settings);
+    let mut made = job.clone();
+    made.sampling.strategy.0 = spec.into();
     let described = Settings {
+        job: job::attributes(&made, &arguments.job.scene),
         scene: report.clone(),
         strategy: spec.description(),
         spp: settings.n_samples,
@@ -97,7 +99,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let build = watch.lap();
     drop(loading);
 
-    let shown_as = arguments.output.tone.of_picture(|| automatic.stops);
+    let shown_as = job.output.of_picture(|| automatic.stops);
     if arguments.output.preview {
         preview::write(view, settings, strategy, &outputs, &shown_as, interrupted)?;
     }
@@ -114,7 +116,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     };
     let running = Some((&render_run, try_writing as TryWriting));
     let render = |camera: &Camera| {
-        Job { scene, camera, environment, settings, progress, render_run: running }.render(strategy)
+        RenderTask { scene, camera, environment, settings, progress, render_run: running }
+            .render(strategy)
     };
     let pictures =
         Pictures { described: &described, settings, denoiser: denoiser.as_ref(), shown_as };
@@ -157,13 +160,13 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     report.profile = progress.profile();
     report.denoised = denoised;
     if outputs.iter().any(PicturePath::is_png) {
-        report.png = Some(Shown::new(&arguments.output.tone, &shown_as).metered(automatic.basis));
+        report.png = Some(Shown::new(&job.output, &shown_as).metered(automatic.basis));
     }
     if arguments.output.json {
         report.print_json()?;
     } else if !quiet {
         report.print_summary();
-        if arguments.scene.environment.env_rotate == Some(Rotation::Auto) {
+        if job.light.rotate == Some(Text(Rotation::Auto)) {
             status(&format!("--env-rotate auto turned the environment by {rotate:.2} degrees"));
         }
     }

@@ -30,6 +30,9 @@ pub(crate) struct Settings {
     pub(crate) threads: usize,
     /// The exposure by the light \[stops\].
     pub(crate) automatic_exposure: f32,
+    /// The attributes from which the same picture can be rendered again.
+    #[serde(skip)]
+    pub(crate) job: Vec<(String, String)>,
 }
 
 impl Settings {
@@ -42,7 +45,7 @@ impl Settings {
             settings,
             exposure: self.automatic_exposure,
         };
-        provenance.attributes()
+        provenance.attributes().into_iter().chain(self.job.clone()).collect()
     }
 }
 

@@ -1,51 +1,15 @@
-//! Converts the flags to a strategy.
+//! Renders with a strategy.
 
 use anyhow::Result;
 use domelight::environment::Environment;
 use domelight::render::{RenderSettings, Renderer, Rendering};
 use domelight::scene::{Camera, Scene};
-use domelight::strategy::{
-    PreparedStrategy, RejectionSampling, ShadingPoint, StrategyError, StrategyKind,
-    StrategyOptions, StrategySpec,
-};
+use domelight::strategy::{PreparedStrategy, RejectionSampling, ShadingPoint, StrategySpec};
 
 use domelight_lab::{Acceptance, count_tries};
 
-use crate::args::sampling::{StrategyArguments, StrategyText};
-use crate::error::UsageError;
 use crate::progress::RenderProgress;
 use crate::render_run::{RenderRun, TryWriting};
-
-impl StrategyArguments {
-    /// The strategy of the flags, which take precedence over the options in its text.
-    pub(crate) fn spec(&self) -> Result<StrategySpec> {
-        let flags = StrategyOptions {
-            rays: self.rays,
-            split: self.split.map(|split| [split.environment, split.brdf]),
-            lights: self.lights,
-            candidates: self.candidates,
-            from: self.from.map(Into::into),
-            resampling: self.resampling.map(Into::into),
-            tries: self.tries,
-            proposal: self.proposal.map(Into::into),
-            heuristic: self.heuristic.map(Into::into),
-            no_compensation: self.no_compensation,
-        };
-        let StrategyText { kind, options } = self.strategy;
-        StrategySpec::new(kind, &flags.or(options))
-            .map_err(|error| UsageError(message(kind, &error)).into())
-    }
-}
-
-/// The message of an error in the flags of a strategy.
-fn message(kind: StrategyKind, error: &StrategyError) -> String {
-    match error {
-        StrategyError::Misplaced { option, strategies } => {
-            format!("--{option} applies to {strategies}, not to --strategy {}", kind.name())
-        }
-        error => format!("--strategy {}: {error}", kind.name()),
-    }
-}
 
 /// The acceptance of rejection sampling at these points; `None` for other strategies.
 ///
@@ -64,7 +28,7 @@ pub(crate) fn acceptance(
 
 /// A scene ready to be rendered.
 #[derive(Clone, Copy)]
-pub(crate) struct Job<'a> {
+pub(crate) struct RenderTask<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) camera: &'a Camera,
     pub(crate) environment: &'a Environment,
@@ -74,7 +38,7 @@ pub(crate) struct Job<'a> {
     pub(crate) render_run: Option<(&'a RenderRun, TryWriting<'a>)>,
 }
 
-impl Job<'_> {
+impl RenderTask<'_> {
     /// Renders with a strategy.
     pub(crate) fn render(&self, strategy: &PreparedStrategy) -> Result<Rendering> {
         let Self { scene, camera, environment, settings, progress, render_run } = *self;

@@ -3,11 +3,11 @@
 use std::error::Error;
 use std::path::Path;
 
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use domelight::bsdf::{MaterialSpec, ParseMaterialError};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::scene::builtin::BuiltinScene;
-use domelight::strategy::{StrategyError, StrategyKind};
+use domelight::strategy::{StrategyError, StrategyKind, StrategyOptions};
 
 /// The minimum similarity of names, in [0, 1], as in clap for options.
 const ALIKE: f64 = 0.7;
@@ -36,8 +36,20 @@ fn builtin<const N: usize>(path: &Path, names: [&'static str; N]) -> Option<&'st
     path.to_str().filter(|_| !is_file).and_then(|text| nearest(text, names))
 }
 
-/// Adds the strategy or material that was meant to an error in the command line, where clap does not know the names.
+/// Adds what was meant to an error in the command line, where clap does not know it: the name of a strategy or material,
+/// or the text of a strategy in place of an option.
 pub(crate) fn add_to(error: &mut clap::Error) {
+    if let Some(ContextValue::String(option)) = error.get(ContextKind::InvalidArg)
+        && error.kind() == ErrorKind::UnknownArgument
+        && let Some(name) = option.strip_prefix("--")
+        && StrategyOptions::NAMES.contains(&name)
+    {
+        let value = if name == "no-compensation" { "" } else { "=…" };
+        let text = format!("{name} belongs to the strategy's text: --strategy NAME:{name}{value}");
+        error.remove(ContextKind::SuggestedArg);
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![text.into()]));
+        return;
+    }
     let Some(source) = error.source() else { return };
     let meant = match (source.downcast_ref(), source.downcast_ref()) {
         (Some(StrategyError::UnknownName(name)), _) => {

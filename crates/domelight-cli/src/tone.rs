@@ -14,7 +14,9 @@ use domelight::render::{ExposureBasis, kept_exposure};
 use domelight_lab::denoise::{Denoiser, Features};
 use serde::Serialize;
 
-use crate::args::{Bits, Tone, ToneArguments};
+use domelight_lab::job::Tone;
+
+use crate::args::{Bits, ToneArguments};
 use crate::error::{UsageError, status, warn};
 use crate::files;
 use crate::memory;

@@ -144,11 +144,7 @@ fn figures_are_those_of_the_film() {
     let quick = ["--reference-spp", "4", "--cache", "cache", "-q", "--json"];
     let report = json(&domelight(&folder, &[&["compare"], &scene[..], &budget, &quick].concat()));
     for (strategy, text) in report["strategies"].as_array().unwrap().iter().zip(STRATEGIES) {
-        let flags = match text.split_once(':') {
-            None => vec!["--strategy", text],
-            Some(("sir", _)) => vec!["--strategy", "sir", "--candidates", "4"],
-            Some((name, n)) => vec!["--strategy", name, "--lights", n],
-        };
+        let flags = ["--strategy", text];
         let (mut samples, mut rays) = (0.0, 0.0);
         for seed in ["0", "1"] {
             let render = ["--spp", "6", "--seed", seed, "-q", "--json", "-o", "x.exr"];

@@ -101,8 +101,8 @@ fn every_engine_gets_its_files() {
     assert!(merge.contains("out/a b.exr"), "{merge}");
     let refused = farm(&folder, "slurm", &["--shards", "2", "--time", "1h"]);
     assert_eq!(refused.status.code(), Some(2));
-    let refused = farm(&folder, "slurm", &["--rays", "1"]);
+    let refused = farm(&folder, "slurm", &["--strategy", "mis"]);
     assert_eq!(refused.status.code(), Some(2));
-    let refused = farm(&folder, "slurm", &["--shards", "2", "--strategy", "mis", "--rays", "1"]);
+    let refused = farm(&folder, "slurm", &["--shards", "2", "--strategy", "mis:1"]);
     assert!(stderr(&refused).contains("split 1:0"), "{}", stderr(&refused));
 }

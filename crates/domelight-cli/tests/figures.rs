@@ -39,7 +39,7 @@ fn all_figures_are_written() {
         assert!(picture.width > 800 && picture.height > 300);
         assert!(page.contains(&format!("<section id=\"figure-{n}\">")));
         assert!(page.contains(&format!(
-            "domelight figures --only {n} --scene sphere --env-rows 24 --quick"
+            "domelight figures --only {n} --scene=sphere --env-rows=24 --quick"
         )));
         assert!(stderr(&output).contains(&format!("figure {n}: ")), "{}", stderr(&output));
     }

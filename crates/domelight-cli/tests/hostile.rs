@@ -511,20 +511,6 @@ fn values_that_options_cannot_have_are_named_with_their_option() {
 }
 
 #[test]
-fn flags_take_precedence_over_the_text_of_a_strategy() {
-    let folder = folder();
-    for (strategy, flag, value, used) in
-        [("mis:3:1", "--rays", "4", "mis 2:2,"), ("mis", "--split", "3:1", "mis 3:1,")]
-    {
-        let small =
-            ["--size", "8x8", "--spp", "1", "--env-rows", "16", "-o", "x.pfm", "-q", "--json"];
-        let given = ["render", "sphere", "--strategy", strategy, flag, value];
-        let report = json(&domelight(&folder, &[&given[..], &small].concat()));
-        assert!(report["settings"]["strategy"].as_str().unwrap().starts_with(used), "{report}");
-    }
-}
-
-#[test]
 fn a_resumed_render_is_as_fast_as_its_own_rays() {
     let folder = folder();
     let render = |more: &[&str]| {

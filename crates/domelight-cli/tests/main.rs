@@ -10,6 +10,7 @@ mod farm;
 mod figures;
 mod hostile;
 mod inspect;
+mod job;
 mod json;
 mod lights;
 mod limits;

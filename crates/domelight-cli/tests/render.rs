@@ -67,17 +67,17 @@ fn every_strategy_renders_and_json_tells_all() {
     let folder = folder();
     let strategies: [&[&str]; 12] = [
         &["--strategy", "sir"],
-        &["--strategy", "sir", "--rays", "3", "--candidates", "20", "--resampling", "reservoir"],
-        &["--strategy", "rejection", "--tries", "9"],
-        &["--strategy", "rejection", "--rays", "2", "--proposal", "environment"],
-        &["--strategy", "median-cut", "--lights", "5"],
+        &["--strategy", "sir:3/20:resampling=reservoir"],
+        &["--strategy", "rejection:9"],
+        &["--strategy", "rejection:rays=2:proposal=environment"],
+        &["--strategy", "median-cut:5"],
         &["--strategy", "variance-minimization"],
-        &["--strategy", "brdf", "--rays", "3"],
+        &["--strategy", "brdf:3"],
         &["--strategy", "environment"],
-        &["--strategy", "mis", "--rays", "5"],
-        &["--strategy", "mis", "--split", "3:1", "--heuristic", "balance"],
-        &["--strategy", "mis", "--no-compensation"],
-        &["--strategy", "mis", "--split", "0:2", "--sampler", "independent"],
+        &["--strategy", "mis:5"],
+        &["--strategy", "mis:3:1:heuristic=balance"],
+        &["--strategy", "mis:no-compensation"],
+        &["--strategy", "mis:0:2", "--sampler", "independent"],
     ];
     for strategy in strategies {
         let scene = ["spheres", "--json", "-q", "-o", "x.exr", "-o", "x.pfm"];
@@ -298,20 +298,26 @@ fn standard_output_takes_a_picture() {
 #[test]
 fn flags_that_contradict_are_usage_errors() {
     let folder = folder();
-    refused(&render(&folder, &["--strategy", "mis", "--rays", "1"]), 2, &["split 1:0"]);
-    refused(&render(&folder, &["--strategy", "brdf", "--split", "1:1"]), 2, &["--split", "mis"]);
-    refused(&render(&folder, &["--lights", "4"]), 2, &["--lights", "median-cut"]);
-    refused(&render(&folder, &["--candidates", "9"]), 2, &["--candidates", "sir"]);
-    let few = ["--strategy", "sir", "--rays", "9", "--candidates", "8"];
-    refused(&render(&folder, &few), 2, &["candidates", "rays"]);
-    let many = ["--strategy", "sir", "--candidates", "1048576", "--spp", "16384"];
+    for (strategy, words) in [
+        ("mis:1", ["mis:1", "split 1:0"]),
+        ("brdf:split=1/1", ["split", "mis"]),
+        ("product:lights=4", ["lights", "median-cut"]),
+        ("product:candidates=9", ["candidates", "sir"]),
+        ("sir:9/8", ["candidates", "rays"]),
+        ("rejection:rays=1", ["tries", "2"]),
+        ("median-cut:rays=4", ["rays", "lights"]),
+        ("environment:no-compensation", ["no-compensation", "mis"]),
+    ] {
+        refused(&render(&folder, &["--strategy", strategy]), 2, &words);
+    }
+    let many = ["--strategy", "sir:1/1048576", "--spp", "16384"];
     refused(&render(&folder, &many), 2, &["2^32", "--spp"]);
-    let one = ["--strategy", "rejection", "--rays", "1"];
-    refused(&render(&folder, &one), 2, &["tries", "2"]);
-    let rays = ["--strategy", "median-cut", "--rays", "4"];
-    refused(&render(&folder, &rays), 2, &["--rays", "lights"]);
-    let other = ["--no-compensation", "--strategy", "environment"];
-    refused(&render(&folder, &other), 2, &["--no-compensation", "mis"]);
+    // Options of a strategy are parts of its text.
+    refused(
+        &render(&folder, &["--strategy", "mis", "--rays", "4"]),
+        2,
+        &["--rays", "--strategy NAME:rays="],
+    );
     refused(&render(&folder, &["--size", "0x4"]), 2, &["0x4", "800x600"]);
     refused(&render(&folder, &["--material", "velvet"]), 2, &["velvet", "ggx:"]);
     refused(&render(&folder, &["-o", "picture.bmp"]), 2, &["picture.bmp", ".exr"]);

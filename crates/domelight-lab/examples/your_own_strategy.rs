@@ -10,7 +10,7 @@ use domelight::strategy::{PointStrategy, SampleIndex, ShadingPoint};
 use domelight_lab::Silent;
 use domelight_lab::compare::{Budget, Comparison, ComparisonSettings};
 use domelight_lab::inspect::Inspection;
-use domelight_lab::scene::SceneSettings;
+use domelight_lab::job::SceneSettings;
 
 /// p = cos θ / π.
 struct Cosine<'e> {

@@ -1,5 +1,6 @@
 //! Depth of field in the user's terms: an f-number, a focus distance, and the number of aperture blades.
 
+use std::fmt;
 use std::str::FromStr;
 
 use domelight::scene::{CameraSettings, Lens, SceneDescription};
@@ -51,6 +52,17 @@ impl FromStr for DepthOfField {
             distance => Some(positive(distance)?),
         };
         Ok(Self { f_number: positive(f_number)?, focus_distance, blades })
+    }
+}
+
+impl fmt::Display for DepthOfField {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.f_number)?;
+        match self.focus_distance {
+            Some(distance) => write!(f, ",{distance}")?,
+            None => f.write_str(",auto")?,
+        }
+        if self.blades == 0 { Ok(()) } else { write!(f, ",{}", self.blades) }
     }
 }
 

@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! use domelight_lab::compare::{Budget, Comparison, ComparisonSettings};
-//! use domelight_lab::scene::SceneSettings;
+//! use domelight_lab::job::SceneSettings;
 //! use domelight::render::RenderSettings;
 //! use domelight_lab::Silent;
 //!
@@ -36,6 +36,7 @@ pub mod figures;
 mod ground;
 mod host;
 pub mod inspect;
+pub mod job;
 pub mod measure;
 pub mod names;
 mod page;

@@ -1,5 +1,6 @@
 //! Strategies by their text.
 
+use std::fmt;
 use std::str::FromStr;
 
 use domelight::strategy::{StrategyError, StrategySpec};
@@ -20,6 +21,18 @@ impl FromStr for NamedStrategy {
 
     fn from_str(text: &str) -> Result<Self, StrategyError> {
         Ok(Self { text: text.to_owned(), spec: text.parse()? })
+    }
+}
+
+impl fmt::Display for NamedStrategy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.text)
+    }
+}
+
+impl From<StrategySpec> for NamedStrategy {
+    fn from(spec: StrategySpec) -> Self {
+        Self { text: spec.to_string(), spec }
     }
 }
 

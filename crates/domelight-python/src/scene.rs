@@ -5,7 +5,7 @@ use std::str::FromStr as _;
 use std::sync::Arc;
 
 use domelight::environment::io::ProbeOptions;
-use domelight::environment::{Orientation, UpAxis};
+use domelight::environment::UpAxis;
 use domelight::geometry::{Aabb, Mesh};
 use domelight::math::{Vec2, Vec3};
 use domelight::picture::MAX_TEXELS;
@@ -513,7 +513,7 @@ impl Scene {
             None => error,
         };
         let map = map.map_err(located)?;
-        let orientation = Orientation { up: settings.up, rotation: settings.rotate_degrees };
+        let orientation = settings.orientation();
         let scale = settings.factor().map_err(to_python)?;
         Environment::build(py, map, orientation, scale, name)
     }

@@ -5,8 +5,8 @@ use std::rc::Rc;
 use domelight::Rgb;
 use domelight::environment::mapping::{Mapping, UnknownMapping};
 use domelight::environment::{LatLongGrid, Orientation, UpAxis};
-use domelight::geometry::{Ray, RayBatch, offset_origin};
 use domelight::math::{Vec3, vec2};
+use domelight::render::visibility;
 use domelight::sampling::{Sampler, SamplerKind};
 use domelight::scene::{Camera, Scene};
 use domelight::strategy::{
@@ -45,24 +45,12 @@ struct PointReport {
 struct Picked {
     scene: Rc<Scene>,
     at: ShadingPoint,
-    extent: f32,
 }
 
 impl Picked {
     /// V in [0, 1] toward each direction.
     fn visibility(&self, directions: &[Vec3]) -> Vec<f32> {
-        let ShadingPoint { position, ng, .. } = self.at;
-        let mut batch = RayBatch::default();
-        let mut visible = Vec::new();
-        let mut occluded = Vec::new();
-        for &wi in directions {
-            let side = if ng.dot(wi) < 0.0 { -ng } else { ng };
-            let origin = offset_origin(position, side, self.extent);
-            occluded.push(self.scene.bvh().any_hit(&Ray::new(origin, wi)));
-            batch.push(origin, wi);
-        }
-        self.scene.transmittances(&batch, &mut visible);
-        visible.iter().zip(occluded).map(|(&v, hit)| if hit { 0.0 } else { v }).collect()
+        visibility(&self.scene, &self.at, directions)
     }
 }
 
@@ -185,7 +173,6 @@ impl Engine {
         let hit = scene.camera_hit(&ray, 0, 0);
         Ok(hit.map(|hit| Picked {
             at: scene.shading_point(&ray, &hit),
-            extent: scene.bounds().size().max_element(),
             scene: scene.clone(),
         }))
     }

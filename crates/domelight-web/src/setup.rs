@@ -7,7 +7,7 @@ use std::str::FromStr;
 use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, probe_from_bytes};
-use domelight::environment::{Environment, Orientation, UpAxis};
+use domelight::environment::{Environment, UpAxis};
 use domelight::math::Vec3;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
@@ -250,15 +250,13 @@ impl Engine {
             (probe.image, probe.warnings)
         };
         let up = self.scene.as_ref().map_or(UpAxis::Y, |(_, loaded)| loaded.up);
-        let orientation = Orientation { up, rotation: light.rotate };
         let settings = EnvironmentSettings {
             rotate_degrees: light.rotate,
             scale: light.scale,
             exposure: light.exposure,
             ..EnvironmentSettings::new(EnvironmentSource::Builtin(light.probe), up)
         };
-        let scale = settings.factor().map_err(error)?;
-        let environment = Environment::new(image, orientation, scale).map_err(error)?;
+        let environment = settings.environment(image).map_err(error)?;
         let map = environment.map();
         let report = ProbeReport { size: [map.width, map.height], warnings };
         self.session = None;

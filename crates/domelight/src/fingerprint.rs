@@ -2,6 +2,9 @@
 //! are equal, wherever their files are.
 
 use std::fmt;
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::Path;
 
 /// 128 bits of a BLAKE3 hash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -36,6 +39,29 @@ impl Fingerprinter {
         }
         self.hasher.update(&buffer[..filled]);
         self.hasher.update(&length.to_le_bytes());
+    }
+
+    /// Hashes the bytes of a file, piece by piece.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn file(&mut self, path: &Path) -> io::Result<()> {
+        let mut file = File::open(path)?;
+        let mut buffer = vec![0; 1 << 16];
+        let mut length = 0u64;
+        loop {
+            let n = match file.read(&mut buffer) {
+                Ok(n) => n,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error),
+            };
+            if n == 0 {
+                self.hasher.update(&length.to_le_bytes());
+                return Ok(());
+            }
+            self.hasher.update(&buffer[..n]);
+            length += n as u64;
+        }
     }
 
     /// Hashes the bits of floats.

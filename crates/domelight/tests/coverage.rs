@@ -3,7 +3,7 @@
 use domelight::environment::{Environment, Orientation};
 use domelight::geometry::{Mesh, Ray, RayBatch};
 use domelight::math::{Mat4, Vec2, Vec3, vec2, vec3};
-use domelight::render::{Background, Layers, RenderSettings, render};
+use domelight::render::{Background, Layers, RenderSettings, pilot_points, render, visibility};
 use domelight::sampling::Pcg32;
 use domelight::scene::builtin::shapes;
 use domelight::scene::{
@@ -712,4 +712,25 @@ fn tiles_do_not_change_what_is_seen_through() {
     };
     assert_eq!(draw(16), draw(5));
     assert_eq!(draw(16), draw(64));
+}
+
+/// A pilot sees the light through foliage that a render sees.
+#[test]
+fn visibility_at_a_point_counts_what_covers_it_in_part() {
+    let white = Material::diffuse("white", Rgb::WHITE);
+    let cards = stack(vec![covering(AlphaMode::Blend, 0.25, 0.5), white], Vec::new());
+    // Between the cards.
+    let camera = CameraSettings {
+        projection: Projection::Perspective { fov_y_degrees: 20.0 },
+        origin: vec3(0.1, -0.5, 0.0),
+        target: vec3(0.0, -1.0, 0.0),
+        up: Vec3::Z,
+    };
+    let camera = Camera::new(&camera, 16, 16).unwrap();
+    let points = pilot_points(&cards, &camera, &settings());
+    assert!(!points.is_empty());
+    for point in &points {
+        let visible = visibility(&cards, point, &[Vec3::Y, vec3(0.6, 0.8, 0.0), -Vec3::Y]);
+        assert_eq!(visible, [0.75, 0.75, 1.0]);
+    }
 }

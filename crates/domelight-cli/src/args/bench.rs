@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, ValueEnum};
 
 use super::{finite, positive};
-use crate::parse::Size;
 use domelight_lab::NamedStrategy;
+use domelight_lab::job::value::Size;
 
 pub(super) const EXAMPLES: &str = "\
 Strategies are written as for compare: NAME[:OPTION]…, such as mis:3/1 or sir:15/800. Materials are written

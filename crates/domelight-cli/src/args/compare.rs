@@ -4,22 +4,21 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::sampling::PixelArguments;
-use super::scene::SceneArguments;
-use super::tone_curve;
+use super::{ThreadArguments, tone_curve};
 use domelight::picture::exposure::Exposure;
 use domelight::picture::tone::ToneCurve;
 use domelight_lab::NamedStrategy;
 use domelight_lab::compare::Budget;
+use domelight_lab::job::{Given, Pixel, SceneSettings};
 
 pub(super) const EXAMPLES: &str = "\
-Strategies are NAME[:OPTION]…, separated by commas. An option is a flag of render without its
-dashes, KEY=VALUE or a bare word. One or two leading numbers set the usual options:
-  brdf:4  environment:4  rejection:rays=2     --rays
-  mis:3/1                                     --split 3:1
-  sir:15/800                                  --rays 15 --candidates 800
-  rejection:32                                --tries 32
-  median-cut:64  variance-minimization:64     --lights 64
+Strategies are NAME[:OPTION]…, separated by commas. An option is KEY=VALUE or a bare word. One or two
+leading numbers set the usual options:
+  brdf:4  environment:4  product:4            rays=4
+  mis:3:1                                     split=3/1
+  sir:15/800                                  rays=15 candidates=800
+  rejection:32                                tries=32
+  median-cut:64  variance-minimization:64     lights=64
   mis:heuristic=balance:no-compensation  sir:4/64:from=brdf:resampling=reservoir
 
 Budgets are per picture: spp:N is camera samples per pixel, rays:N is shadow rays traced per pixel
@@ -41,10 +40,12 @@ Examples:
 
 /// Compare strategies on one scene at equal samples, rays or time.
 #[derive(Args, Debug)]
-#[command(mut_arg("size", |size| size.default_value("256x256")))]
+#[command(mut_arg("view.size", |size| size.default_value("256x256")))]
 pub(crate) struct CompareArguments {
     #[command(flatten)]
-    pub(crate) scene: SceneArguments,
+    pub(crate) given: Given,
+    #[command(flatten)]
+    pub(crate) scene: SceneSettings,
 
     /// Strategies, as described below
     #[arg(
@@ -83,7 +84,9 @@ pub(crate) struct CompareArguments {
     pub(crate) no_cache: bool,
 
     #[command(flatten)]
-    pub(crate) pixel: PixelArguments,
+    pub(crate) pixel: Pixel,
+    #[command(flatten)]
+    pub(crate) threads: ThreadArguments,
 
     /// Output file; - writes the report to standard output
     #[arg(

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use clap::parser::ValueSource;
 use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 
-use super::sampling::{PixelArguments, SampleArguments, StrategyArguments};
-use super::scene::SceneArguments;
-use super::{MemoryArguments, Tone};
+use domelight_lab::job::{Job, Tone};
+
+use super::{MemoryArguments, ThreadArguments};
 use crate::output::PicturePath;
 
 pub(super) const EXAMPLES: &str = "\
@@ -34,13 +34,9 @@ pub(crate) struct FarmArguments {
     #[arg(value_enum)]
     pub(crate) engine: Engine,
     #[command(flatten)]
-    pub(crate) scene: SceneArguments,
+    pub(crate) job: Job,
     #[command(flatten)]
-    pub(crate) strategy: StrategyArguments,
-    #[command(flatten)]
-    pub(crate) samples: SampleArguments,
-    #[command(flatten)]
-    pub(crate) pixel: PixelArguments,
+    pub(crate) threads: ThreadArguments,
     /// Number of parts
     #[arg(long, value_name = "N", help_heading = "Farm",
           value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -51,9 +47,6 @@ pub(crate) struct FarmArguments {
     /// Merged picture [default: picture.exr in the folder]
     #[arg(long, value_name = "FILE", help_heading = "Farm")]
     pub(crate) picture: Option<PicturePath>,
-    /// How a merged picture for viewing is developed.
-    #[command(flatten, next_help_heading = "Farm")]
-    pub(crate) tone: Tone,
     /// Cores per task
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Farm",
           value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -88,10 +81,7 @@ pub(crate) struct JobWords {
 impl JobWords {
     /// The arguments of `render` that are passed to jobs unchanged.
     fn render_command() -> Command {
-        let command = SceneArguments::augment_args(Command::new("render"));
-        let command = StrategyArguments::augment_args(command);
-        let command = SampleArguments::augment_args(command);
-        MemoryArguments::augment_args(PixelArguments::augment_args(command))
+        MemoryArguments::augment_args(Job::augment_args(Command::new("render")))
     }
 }
 
@@ -127,14 +117,15 @@ impl JobWords {
         let mut scene = Vec::new();
         for argument in command.get_arguments() {
             let id = argument.get_id().as_str();
-            // Each engine sets the number of threads.
-            if id == "threads" || matches.value_source(id) != Some(ValueSource::CommandLine) {
+            if matches.value_source(id) != Some(ValueSource::CommandLine) {
                 continue;
             }
             // If an argument is repeated, the last value counts.
             let value = matches.get_raw(id).and_then(Iterator::last).unwrap_or_default();
             match (argument.get_long(), argument.get_action()) {
-                (Some(long), ArgAction::SetTrue) => words.push(format!("--{long}").into()),
+                (Some(long), ArgAction::SetTrue | ArgAction::SetFalse) => {
+                    words.push(format!("--{long}").into());
+                }
                 (Some(long), _) => {
                     let mut word = OsString::from(format!("--{long}="));
                     word.push(value);
@@ -167,9 +158,7 @@ mod tests {
         let Subcommand::Render(render) = Arguments::try_parse_from(render).unwrap().command else {
             panic!("no render")
         };
-        assert_eq!(format!("{:?}", render.scene), format!("{:?}", farm.scene));
-        assert_eq!(format!("{:?}", render.strategy), format!("{:?}", farm.strategy));
-        assert_eq!(format!("{:?}", render.samples), format!("{:?}", farm.samples));
+        assert_eq!(render.job, farm.job);
         let words: Vec<_> = farm.words.render.iter().map(|w| w.to_string_lossy()).collect();
         words.join(" ")
     }

@@ -2,9 +2,8 @@
 
 use clap::Args;
 use domelight_lab::figures::N_FIGURES;
+use domelight_lab::job::Light;
 use std::path::PathBuf;
-
-use super::scene::EnvironmentArguments;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -38,5 +37,5 @@ pub(crate) struct FiguresArguments {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
     #[command(flatten)]
-    pub(crate) environment: EnvironmentArguments,
+    pub(crate) light: Light,
 }

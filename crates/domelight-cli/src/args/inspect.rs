@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use domelight_lab::NamedStrategy;
+use domelight_lab::job::{Given, Pixel, SceneSettings};
 
-use super::sampling::PixelArguments;
-use super::scene::SceneArguments;
+use super::ThreadArguments;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -21,7 +21,9 @@ Examples:
 #[derive(Args, Debug)]
 pub(crate) struct InspectArguments {
     #[command(flatten)]
-    pub(crate) scene: SceneArguments,
+    pub(crate) given: Given,
+    #[command(flatten)]
+    pub(crate) scene: SceneSettings,
 
     /// Column and row of the pixel, counted from 0 at the upper left [default: the center]
     #[arg(
@@ -43,7 +45,9 @@ pub(crate) struct InspectArguments {
     pub(crate) strategies: Vec<NamedStrategy>,
 
     #[command(flatten)]
-    pub(crate) sampling: PixelArguments,
+    pub(crate) sampling: Pixel,
+    #[command(flatten)]
+    pub(crate) threads: ThreadArguments,
 
     /// Output file, .html or .json; - writes JSON to standard output
     #[arg(

@@ -8,9 +8,9 @@ use clap::{Args, ValueEnum};
 use domelight::rig::export::Format;
 use domelight::rig::{MedianCut, Method, VarianceMinimization};
 
-use super::scene::EnvironmentArguments;
-use super::{Tone, one_of, percent};
+use super::{one_of, percent};
 use crate::output::PicturePath;
+use domelight_lab::job::{Light, Tone};
 
 pub(super) const EXAMPLES: &str = "\
 The rig consists of the sun (--sun) and lamps (--lamps), then of regions of the remaining light
@@ -33,7 +33,7 @@ Examples:
 #[derive(Args, Debug)]
 pub(crate) struct LightsArguments {
     #[command(flatten)]
-    pub(crate) environment: EnvironmentArguments,
+    pub(crate) light: Light,
 
     /// Number of lights, including sun and lamps [default: 64; with --sun or --lamps, only those]
     #[arg(short = 'n', long = "lights", value_name = "N", help_heading = "Lights",

@@ -8,8 +8,6 @@ pub(crate) mod inspect;
 pub(crate) mod lights;
 pub(crate) mod render;
 pub(crate) mod render_run;
-pub(crate) mod sampling;
-pub(crate) mod scene;
 pub(crate) mod turntable;
 
 use crate::memory::MaxMemory;
@@ -17,8 +15,8 @@ use crate::output::PicturePath;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Arg, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
 use domelight::environment::mapping::Mapping;
-use domelight::picture::exposure::Exposure;
-use domelight::picture::tone::{ToneCurve, ToneMapping};
+use domelight::picture::tone::ToneCurve;
+use domelight_lab::job::Tone;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -109,7 +107,7 @@ pub(crate) enum Command {
     #[command(after_help = bench::EXAMPLES)]
     Bench(Box<bench::BenchArguments>),
     /// Convert a light probe to a light rig and a residual map.
-    #[command(after_help = lights::EXAMPLES, mut_arg("env", lights::positional))]
+    #[command(after_help = lights::EXAMPLES, mut_arg("light.map", lights::positional))]
     Lights(Box<lights::LightsArguments>),
     /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
     #[command(after_help = DIFF_EXAMPLES)]
@@ -123,6 +121,9 @@ pub(crate) enum Command {
     /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
     #[command(after_help = figures::EXAMPLES)]
     Figures(Box<figures::FiguresArguments>),
+    /// Print the JSON Schema of jobs: of scene files that say how to render, and of what a picture says of itself.
+    #[command(after_help = SCHEMA_EXAMPLES)]
+    Schema,
     /// Print a shell completion script.
     #[command(after_help = COMPLETIONS_EXAMPLES)]
     Completions(CompletionsArguments),
@@ -130,6 +131,12 @@ pub(crate) enum Command {
     #[command(after_help = MAN_EXAMPLES)]
     Man(ManArguments),
 }
+
+const SCHEMA_EXAMPLES: &str = "\
+Examples:
+  domelight schema > domelight.schema.json
+      then, in an editor with a TOML language server, the first line of a job:
+      #:schema ./domelight.schema.json";
 
 const COMPLETIONS_EXAMPLES: &str = "\
 Examples:
@@ -302,9 +309,6 @@ pub(crate) struct ProbeArguments {
     /// Refuse values that are otherwise repaired with a warning: negative, NaN and infinite ones.
     #[arg(long)]
     pub(crate) strict: bool,
-    /// The behavior without --strict; kept for existing scripts.
-    #[arg(long, hide = true, conflicts_with = "strict")]
-    pub(crate) sanitize: bool,
     /// The OpenEXR layer.
     #[arg(long, value_name = "NAME")]
     pub(crate) layer: Option<String>,
@@ -368,42 +372,13 @@ pub(crate) enum Bits {
     Sixteen,
 }
 
-/// Exposure and tone curve of pictures for viewing.
+/// How many threads work.
 #[derive(Args, Debug)]
-pub(crate) struct Tone {
-    /// Exposure of pictures for viewing, in stops; auto maps the median over the covered pixels to middle gray
-    /// [default: auto; 0 for differences]
-    #[arg(long, value_name = "EV|auto", allow_negative_numbers = true)]
-    exposure: Option<Exposure>,
-    /// Tone curve of pictures for viewing; agx is Blender's, standard clips at 1 [default: agx; standard for
-    /// differences]
-    #[arg(long, value_name = "CURVE", value_parser = tone_curve())]
-    tone: Option<ToneCurve>,
-}
-
-impl Tone {
-    /// The tone mapping of pictures for viewing; `automatic` computes the exposure if none was given.
-    pub(crate) fn of_picture(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
-        let exposure = match self.exposure.unwrap_or(Exposure::Auto) {
-            Exposure::Auto => automatic(),
-            Exposure::Stops(stops) => stops,
-        };
-        ToneMapping { exposure, curve: self.tone.unwrap_or(ToneCurve::Agx) }
-    }
-
-    /// The tone mapping of pictures for measurement or further use: none, unless requested.
-    pub(crate) fn of_measurement(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
-        let exposure = match self.exposure.unwrap_or(Exposure::Stops(0.0)) {
-            Exposure::Auto => automatic(),
-            Exposure::Stops(stops) => stops,
-        };
-        ToneMapping { exposure, curve: self.tone.unwrap_or(ToneCurve::Standard) }
-    }
-
-    /// Whether pictures for viewing are exposed automatically.
-    pub(crate) fn is_automatic(&self) -> bool {
-        matches!(self.exposure, None | Some(Exposure::Auto))
-    }
+#[command(next_help_heading = "Sampling")]
+pub(crate) struct ThreadArguments {
+    /// Number of threads [default: SLURM_CPUS_PER_TASK, otherwise the cores available to the process]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
 }
 
 fn mapping() -> impl TypedValueParser<Value = Mapping> {

@@ -2,10 +2,10 @@
 
 use clap::{Args, ValueEnum};
 
-use super::Tone;
+use domelight_lab::job::{Given, Job};
+
+use super::ThreadArguments;
 use super::render_run::RenderRunArguments;
-use super::sampling::{PixelArguments, SampleArguments, StrategyArguments};
-use super::scene::SceneArguments;
 use super::turntable::TurntableArguments;
 use crate::output::PicturePath;
 
@@ -15,13 +15,13 @@ Examples:
       the built-in statue under the built-in sky, into domelight.exr and domelight.png
   domelight render bunny.ply --env studio.hdr --material ggx:0.2 --ground -o bunny.png
       your mesh under your HDRI
-  domelight render scene.toml --strategy mis --split 3:1 --spp 256 -o out.exr -o out.png
+  domelight render scene.toml --strategy mis:3:1 --spp 256 -o out.exr -o out.png
       a scene file, three environment samples per BRDF sample
   domelight render robot.glb --env studio.hdr --view three-quarter --env-rotate auto --ground shadow
       a three-quarter view, lit from the left, with its shadow on the map
   domelight render robot.glb --env studio.hdr --turntable 36 -o robot.png
       robot.0000.png to robot.0035.png, once around the robot
-  domelight render spheres --env cathedral --strategy brdf --rays 4 --json > stats.json
+  domelight render spheres --env cathedral --strategy brdf:4 --json > stats.json
       another built-in scene, with its statistics as JSON
   domelight render --spp 4096 --checkpoint long.exr
   domelight render --spp 4096 --resume long.exr
@@ -33,13 +33,11 @@ Examples:
 #[derive(Args, Debug)]
 pub(crate) struct RenderArguments {
     #[command(flatten)]
-    pub(crate) scene: SceneArguments,
+    pub(crate) given: Given,
     #[command(flatten)]
-    pub(crate) strategy: StrategyArguments,
+    pub(crate) job: Job,
     #[command(flatten)]
-    pub(crate) samples: SampleArguments,
-    #[command(flatten)]
-    pub(crate) pixel: PixelArguments,
+    pub(crate) threads: ThreadArguments,
     #[command(flatten)]
     pub(crate) render_run: RenderRunArguments,
     #[command(flatten)]
@@ -56,9 +54,6 @@ pub(crate) struct OutputArguments {
     /// standard output [default: domelight.exr and domelight.png]
     #[arg(short, long = "output", value_name = "FILE")]
     pub(crate) output: Vec<PicturePath>,
-    /// How PNG output is developed.
-    #[command(flatten)]
-    pub(crate) tone: Tone,
     /// Denoise PNG, HDR and PFM output with Open Image Denoise, if its library is installed or $OIDN_LIBRARY names it;
     /// OpenEXR keeps all layers as rendered and gets an additional layer, denoised
     #[arg(long, conflicts_with_all = ["shard", "tiles"])]

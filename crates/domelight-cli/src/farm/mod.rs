@@ -19,6 +19,9 @@ use crate::args::farm::{Engine, FarmArguments};
 use crate::error::{UsageError, status};
 use crate::files;
 use crate::output::{PicturePath, print_code, print_json};
+use crate::scene::{declare, load};
+use domelight_lab::job::Sampling;
+use domelight_lab::job::value::Text;
 use domelight_lab::refuse_repeating_points;
 
 /// The settings that every engine gets.
@@ -76,8 +79,9 @@ struct Submission {
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
-    refuse_repeating_points(arguments.strategy.spec()?, arguments.samples.spp)?;
-    if arguments.scene.environment.env.as_deref() == Some("-") {
+    let Sampling { strategy: Text(strategy), spp, .. } = &arguments.job.sampling;
+    refuse_repeating_points(strategy.spec, spp.get())?;
+    if arguments.job.light.map.as_deref() == Some("-") {
         return Err(UsageError("--env -: a job has no standard input; name a file".into()).into());
     }
     let farm = Farm::new(arguments)?;
@@ -88,10 +92,10 @@ pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
         Engine::Parallel => parallel::submission(&farm)?,
     };
     // Jobs read these, and write the picture.
-    arguments.scene.declare()?;
+    declare(&arguments.job.scene, &arguments.job.light)?;
     if Path::new(&farm.picture).exists() {
         // It may be one of the scene's own files.
-        arguments.scene.load(true)?;
+        load(&arguments.job.scene_settings(), true)?;
     }
     for path in files.iter().map(|file| farm.path(file.name)).chain([farm.picture.clone()]) {
         files::declare(Path::new(&path))?;
@@ -123,7 +127,7 @@ impl Farm {
         let cwd = std::env::current_dir().context("the current folder")?;
         let program = std::env::current_exe().context("the path of this program")?;
         let folder = cwd.join(&arguments.output);
-        let stem = Path::new(&arguments.scene.scene).file_stem().unwrap_or_default();
+        let stem = Path::new(&arguments.job.scene).file_stem().unwrap_or_default();
         let picture = match &arguments.picture {
             Some(picture) if picture.is_standard_output() => {
                 return Err(UsageError("--picture -: a farm's picture is a file".into()).into());
@@ -143,7 +147,7 @@ impl Farm {
             render: shell::words(words(&arguments.words.render)?),
             merge_options,
             n_shards: arguments.shards,
-            threads: arguments.pixel.threads.unwrap_or(arguments.cpus),
+            threads: arguments.threads.threads.unwrap_or(arguments.cpus),
             picture: utf8(&picture)?,
             volume_picture: arguments.picture.as_ref().map(volume_path).transpose()?,
             name: job_name(&stem.to_string_lossy()),

@@ -25,6 +25,7 @@ use crate::error::{UsageError, status, warn};
 use crate::files;
 use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print, print_json};
+use crate::scene::without_camera;
 use crate::terminal::Terminal;
 use domelight_lab::Stopwatch;
 use domelight_lab::names::file_name;
@@ -239,16 +240,13 @@ impl LightsArguments {
     }
 
     fn load(&self, quiet: bool) -> Result<(Environment, String)> {
-        let settings = self.environment.settings_without_camera()?;
+        let settings = without_camera(&self.light)?;
         let light = settings.over(&SceneDescription::default());
         let map = settings.load(&light, &Terminal { quiet })?;
-        let probe = self.environment.env.clone().unwrap_or_default();
+        let probe = self.light.map.clone().unwrap_or_default();
         let more = memory::EXTRACTION_TEXEL - Environment::MEMORY_PER_TEXEL;
         memory::allow(&format!("{probe}: its lights"), more * map.pixels.len() as u64)?;
-        let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
-        let scale = light.factor().with_context(|| probe.clone())?;
-        let environment =
-            Environment::new(map, orientation, scale).with_context(|| probe.clone())?;
+        let environment = light.environment(map).with_context(|| probe.clone())?;
         Ok((environment, probe))
     }
 

@@ -129,7 +129,7 @@ fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
     let options = ProbeOptions {
         mapping: arguments.mapping,
         layer: arguments.layer.clone(),
-        strict: arguments.strict && !arguments.sanitize,
+        strict: arguments.strict,
         max_memory: memory::left(),
     };
     Ok(load_probe(&arguments.probe, &options)?)

@@ -10,12 +10,12 @@ use domelight::environment::{Environment, Orientation};
 use domelight::math::{Vec3, vec3};
 use domelight::render::{Background, Filter, RenderSettings};
 use domelight::scene::builtin::BuiltinScene;
-use domelight::scene::{CameraSettings, Projection, SceneDescription};
+use domelight::scene::{CameraSettings, SceneDescription};
 
 use super::BenchSettings;
-use crate::scene::{
-    LightSettings, PreparedScene, SceneSettings, SubjectSettings, ViewSettings, close_up,
-};
+use crate::job::value::{Count, NotNegative, Rotation, Size, Text, Triple};
+use crate::job::{Light, SceneSettings, Subject, View};
+use crate::scene::{PreparedScene, close_up};
 use crate::usage::{Seconds, Stopwatch};
 use crate::{At as _, Error, Host};
 
@@ -260,31 +260,28 @@ impl Case {
         let normalize = self.material != CaseMaterial::Own;
         let usual = normalize && self.placement == CameraPlacement::Standard;
         SceneSettings {
-            environment: light(&self.probe, settings.rotate, ROWS),
-            view: ViewSettings {
-                size,
-                camera: None,
-                view: None,
-                all_around: false,
-                depth_of_field: None,
-                origin: usual.then_some(ORIGIN),
-                target: usual.then_some(Vec3::ZERO),
-                up: usual.then_some(Vec3::Y),
-                projection: usual.then_some(Projection::Perspective { fov_y_degrees: FOV }),
+            light: light(&self.probe, settings.rotate, ROWS),
+            view: View {
+                size: Text(Size { width: size[0], height: size[1] }),
+                origin: usual.then_some(Text(Triple(ORIGIN))),
+                target: usual.then_some(Text(Triple(Vec3::ZERO))),
+                up: usual.then_some(Text(Triple(Vec3::Y))),
+                fov: NotNegative::new(FOV).filter(|_| usual),
+                ..View::default()
             },
-            subject: SubjectSettings { material: None, normalize, ground: None, hide_env: true },
+            subject: Subject { normalize, hide_env: true, ..Subject::default() },
             ..SceneSettings::new(&self.scene, size)
         }
     }
 }
 
 /// The argument of `render` for a probe.
-fn light(probe: &str, rotate: f32, rows: u32) -> LightSettings {
-    LightSettings {
-        probe: Some(probe.to_owned()),
-        rotate: Some(rotate),
-        rows,
-        ..LightSettings::default()
+fn light(probe: &str, rotate: f32, rows: u32) -> Light {
+    Light {
+        map: Some(probe.to_owned()),
+        rotate: Some(Text(Rotation::Degrees(rotate))),
+        rows: Count::new(rows),
+        ..Light::default()
     }
 }
 

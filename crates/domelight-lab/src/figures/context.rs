@@ -10,7 +10,7 @@ use domelight::bsdf::Bsdf;
 use domelight::code;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::mapping::{Mapping, to_lat_long};
-use domelight::environment::{Environment, LatLongGrid, Orientation};
+use domelight::environment::{Environment, LatLongGrid};
 use domelight::math::{Vec3, vec2};
 use domelight::picture::compare::compare;
 use domelight::picture::exposure::Exposure;
@@ -23,10 +23,9 @@ use domelight::scene::{Camera, EnvironmentSettings, EnvironmentSource, Scene, Sc
 use domelight::strategy::{PreparedStrategy, StrategySpec};
 
 use super::FigureSettings;
+use crate::job::{FilePart, Job, load_scene, probe_name};
 use crate::names::shared_word;
-use crate::scene::{
-    BUILTIN_ROWS, FileSettings, LightSettings, close_up, load_scene, probe_name, view_of,
-};
+use crate::scene::{close_up, view_of};
 use crate::usage::Stopwatch;
 use crate::{At as _, Error, Host};
 
@@ -67,8 +66,7 @@ impl<'a> FigureContext<'a> {
     /// # Errors
     /// If the scene or the probe cannot be used, or the map is black.
     pub fn load(settings: &FigureSettings, host: &'a dyn Host) -> Result<Self, Error> {
-        let (mut description, _) =
-            load_scene(&settings.scene, &FileSettings::default(), false, host)?;
+        let (mut description, _) = load_scene(&settings.scene, &FilePart::default(), false, host)?;
         let is_builtin = BuiltinScene::from_str(&settings.scene).is_ok();
         if is_builtin || description.environment.is_none() {
             let source = EnvironmentSource::Builtin(BuiltinProbe::Cathedral.name().to_owned());
@@ -77,10 +75,8 @@ impl<'a> FigureContext<'a> {
         }
         let light = settings.environment.over(&description);
         let map = settings.environment.load(&light, host)?;
-        let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
         let probe = probe_name(&light.source);
-        let scale = light.factor().at(&probe)?;
-        let environment = Environment::new(map, orientation, scale).at(&probe)?;
+        let environment = light.environment(map).at(&probe)?;
         if environment.power() == 0.0 {
             let why = format!("{probe}: the map is black; there is nothing to show");
             return Err(Error::Failed(why));
@@ -176,47 +172,23 @@ impl<'a> FigureContext<'a> {
     }
 }
 
-/// The flags shared by all commands on the page.
+/// The options shared by all commands on the page, with a space before each.
 fn common_arguments(settings: &FigureSettings) -> Code<Shell> {
-    let mut text = Code::default();
-    let mut add = |flag: &'static str, value: String| {
-        text +=
-            code!(Shell, " {flag} {value}", flag = flag, value = shell::word(&shared_word(&value)));
-    };
-    let environment: &LightSettings = &settings.environment;
+    let mut words = Vec::new();
     if settings.scene != BuiltinScene::Statue.name() {
-        add("--scene", settings.scene.clone());
+        words.push(format!("--scene={}", settings.scene));
     }
-    if let Some(probe) = &environment.probe {
-        add("--env", probe.clone());
-    }
-    let numbers = [
-        ("--env-rotate", environment.rotate),
-        ("--env-scale", environment.scale),
-        ("--env-exposure", environment.exposure),
-    ];
-    for (flag, value) in numbers {
-        if let Some(value) = value {
-            add(flag, value.to_string());
-        }
-    }
-    if let Some(up) = environment.up {
-        add("--env-up", format!("{up:?}").to_lowercase());
-    }
-    if let Some(mapping) = environment.mapping {
-        add("--env-mapping", mapping.name().to_owned());
-    }
-    if let Some(layer) = &environment.layer {
-        add("--env-layer", layer.clone());
-    }
-    if environment.rows != BUILTIN_ROWS {
-        add("--env-rows", environment.rows.to_string());
-    }
+    let light = settings.environment.clone();
+    words.extend(Job { light, ..Job::default() }.arguments());
     if settings.seed != 0 {
-        add("--seed", settings.seed.to_string());
+        words.push(format!("--seed={}", settings.seed));
     }
-    for (flag, given) in [(" --strict", environment.strict_scene), (" --quick", settings.quick)] {
-        text += if given { flag } else { "" };
+    if settings.quick {
+        words.push("--quick".to_owned());
+    }
+    let mut text = Code::default();
+    for word in words {
+        text += code!(Shell, " {word}", word = shell::word(&shared_word(&word)));
     }
     text
 }

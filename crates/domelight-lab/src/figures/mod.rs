@@ -26,7 +26,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use crate::scene::LightSettings;
+use crate::job::Light;
 use crate::{At as _, Error};
 pub use context::FigureContext;
 use figure::Figure;
@@ -40,7 +40,7 @@ pub struct FigureSettings {
     /// A built-in scene or a file.
     pub scene: String,
     /// The light; a built-in scene is lit by the cathedral by default.
-    pub environment: LightSettings,
+    pub environment: Light,
     /// Whether to use small pictures, few samples and noisy references.
     pub quick: bool,
     /// The seed of the random numbers.

@@ -99,6 +99,11 @@ impl FileLedger {
         }
     }
 
+    /// The files that are declared as read, in the order of their declarations.
+    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.read.iter().map(|(path, _)| path.as_path())
+    }
+
     /// A file in a folder that is declared as read, if there is one.
     pub fn read_in(&self, folder: &Path) -> Option<&Path> {
         let folder = fs::canonicalize(folder).ok()?;

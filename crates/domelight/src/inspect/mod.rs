@@ -39,7 +39,7 @@ pub use hemisphere::{DirectionHistogram, DirectionSample, Hemisphere};
 pub use regions::{Source, SourceKind};
 
 use crate::environment::Environment;
-use crate::geometry::{Ray, RayBatch, offset_origin};
+use crate::geometry::{Ray, RayBatch};
 use crate::math::Vec3;
 use crate::render::{Background, FilterSampler, RenderSettings, visibility};
 use crate::sampling::{Dimension, Heuristic, Sampler};
@@ -273,11 +273,7 @@ impl<'a> Inspector<'a> {
     }
 
     fn trace(&self, point: &ShadingPoint, wi: &[Vec3]) -> Vec<f32> {
-        let mut rays = RayBatch::default();
-        for &wi in wi {
-            self.push_ray(point, wi, &mut rays);
-        }
-        self.trace_batch(&rays)
+        visibility(self.scene, point, wi)
     }
 
     fn trace_batch(&self, rays: &RayBatch) -> Vec<f32> {
@@ -287,8 +283,7 @@ impl<'a> Inspector<'a> {
     }
 
     fn push_ray(&self, point: &ShadingPoint, wi: Vec3, rays: &mut RayBatch) {
-        let side = if point.ng.dot(wi) < 0.0 { -point.ng } else { point.ng };
-        rays.push(offset_origin(point.position, side, self.extent), wi);
+        rays.push(visibility::origin(point, wi, self.extent), wi);
     }
 }
 

@@ -41,10 +41,11 @@ pub use renderer::Renderer;
 pub use tile::{Counts, Mark};
 pub use tiling::{Tiling, Window};
 pub use variance::VarianceSums;
+pub use visibility::visibility;
 
 use crate::Rgb;
 use crate::environment::Environment;
-use crate::geometry::{Ray, offset_origin};
+use crate::geometry::Ray;
 use crate::math::{FRAC_1_PI, Vec3};
 use crate::sampling::SamplerKind;
 use crate::scene::material::CATCHER_REFLECTANCE;
@@ -278,12 +279,7 @@ impl StrategySpec {
         environment: &Environment,
         settings: &RenderSettings,
     ) -> Self {
-        let extent = scene.extent();
-        let visibility = |at: &ShadingPoint, wi: Vec3| {
-            let side = if at.ng.dot(wi) < 0.0 { -at.ng } else { at.ng };
-            let ray = Ray::new(offset_origin(at.position, side, extent), wi);
-            if scene.bvh().any_hit(&ray) { 0.0 } else { 1.0 }
-        };
+        let visibility = |at: &ShadingPoint, wi: Vec3| visibility(scene, at, &[wi])[0];
         let points = || pilot_points(scene, camera, settings);
         self.for_scene(points, visibility, environment, settings.seed)
     }

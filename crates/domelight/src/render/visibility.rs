@@ -1,7 +1,28 @@
 //! Traces shadow rays; no other module does.
 
-use crate::geometry::RayBatch;
+use crate::geometry::{RayBatch, offset_origin};
+use crate::math::Vec3;
 use crate::scene::Scene;
+use crate::strategy::ShadingPoint;
+
+/// V of each direction at a point, in [0, 1]: 0 if the scene occludes the light from there, otherwise the transmittance of
+/// what covers it in part. The point is in units of [`Scene::unit`], as [`pilot_points`](super::pilot_points) gives them.
+pub fn visibility(scene: &Scene, point: &ShadingPoint, directions: &[Vec3]) -> Vec<f32> {
+    let extent = scene.extent();
+    let mut rays = RayBatch::default();
+    for &wi in directions {
+        rays.push(origin(point, wi, extent), wi);
+    }
+    let mut visible = Vec::new();
+    trace(scene, &rays, &mut Scratch::default(), &mut visible);
+    visible
+}
+
+/// The origin of a shadow ray, off the surface on the side of its direction. `extent` is that of the scene.
+pub(crate) fn origin(point: &ShadingPoint, wi: Vec3, extent: f32) -> Vec3 {
+    let side = if point.ng.dot(wi) < 0.0 { -point.ng } else { point.ng };
+    offset_origin(point.position, side, extent)
+}
 
 /// Scratch memory for tracing.
 #[derive(Default)]

@@ -8,7 +8,8 @@ use super::camera::CameraSettings;
 use super::framing::ViewDirection;
 use super::material::Material;
 use super::texture::Texture;
-use crate::environment::{EnvironmentError, UpAxis};
+use crate::RgbImage;
+use crate::environment::{Environment, EnvironmentError, Orientation, UpAxis};
 use crate::geometry::{Aabb, Mesh, conjugated};
 use crate::math::{Mat4, functions};
 
@@ -105,6 +106,19 @@ impl EnvironmentSettings {
             return Err(EnvironmentError::BadExposure { exposure, factor });
         }
         Ok(factor)
+    }
+
+    /// How the map stands in the world.
+    pub fn orientation(&self) -> Orientation {
+        Orientation { up: self.up, rotation: self.rotate_degrees }
+    }
+
+    /// The light that the lat-long `map` gives: turned, scaled and exposed.
+    ///
+    /// # Errors
+    /// If a texel or the factor is invalid.
+    pub fn environment(&self, map: RgbImage) -> Result<Environment, EnvironmentError> {
+        Environment::new(map, self.orientation(), self.factor()?)
     }
 }
 

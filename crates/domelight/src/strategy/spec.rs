@@ -289,6 +289,20 @@ impl FromStr for StrategyKind {
 }
 
 impl StrategyOptions {
+    /// The names of all options.
+    pub const NAMES: [&str; 10] = [
+        "rays",
+        "split",
+        "lights",
+        "candidates",
+        "from",
+        "resampling",
+        "tries",
+        "proposal",
+        "heuristic",
+        "no-compensation",
+    ];
+
     /// Splits `NAME[:OPTION]…` into the strategy and its options.
     ///
     /// # Errors

@@ -55,7 +55,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{MapAccess, Visitor};
+use serde::de::{IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
@@ -144,6 +144,21 @@ struct SceneFile {
     materials: BTreeMap<String, Spanned<MaterialEntry>>,
     #[serde(default)]
     objects: Vec<Spanned<ObjectTable>>,
+    /// How the scene is rendered, which is not the description's business.
+    #[serde(default, rename = "file")]
+    _file: IgnoredAny,
+    #[serde(default, rename = "light")]
+    _light: IgnoredAny,
+    #[serde(default, rename = "view")]
+    _view: IgnoredAny,
+    #[serde(default, rename = "subject")]
+    _subject: IgnoredAny,
+    #[serde(default, rename = "sampling")]
+    _sampling: IgnoredAny,
+    #[serde(default, rename = "pixel")]
+    _pixel: IgnoredAny,
+    #[serde(default, rename = "output")]
+    _output: IgnoredAny,
 }
 
 #[derive(Deserialize)]

@@ -1,0 +1,148 @@
+//! The light: a map and how it is used.
+
+use std::path::Path;
+use std::str::FromStr as _;
+
+use clap::Args;
+use domelight::RgbImage;
+use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::io::{ProbeError, ProbeOptions};
+use domelight::environment::mapping::Mapping;
+use domelight::environment::{Environment, UpAxis};
+use domelight::picture::{PictureError, PictureErrorKind};
+use domelight::scene::{EnvironmentSettings, EnvironmentSource, LoadError, SceneDescription};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::defaults;
+use super::value::{Choice, Count, Finite, NotNegative, Rotation, Text};
+use crate::{Error, Host};
+
+/// The light. What is not said comes from the scene.
+#[derive(Args, Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[command(next_help_heading = "Environment")]
+#[serde(default, deny_unknown_fields)]
+pub struct Light {
+    /// A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm, .png, .jpg;
+    /// - reads standard input) [default: the scene's, otherwise sky]
+    #[arg(id = "light.map", long = "env", value_name = "PROBE")]
+    pub map: Option<String>,
+    /// Rotate the environment about the up axis, counterclockwise as seen from above [degrees]; with a
+    /// camera, auto puts its sun or brightest side to the left of it
+    #[arg(id = "light.rotate", long = "env-rotate", value_name = "DEG|auto")]
+    pub rotate: Option<Text<Rotation>>,
+    /// Multiply the environment's radiance
+    #[arg(id = "light.scale", long = "env-scale", value_name = "X")]
+    pub scale: Option<NotNegative>,
+    /// Multiply the environment's radiance by 2^EV
+    #[arg(id = "light.exposure", long = "env-exposure", value_name = "EV")]
+    pub exposure: Option<Finite>,
+    /// World axis toward which the top of the map points
+    #[arg(id = "light.up", long = "env-up", value_name = "AXIS")]
+    pub up: Option<Choice<UpAxis>>,
+    /// Layout of the map [default: inferred from the shape and the attributes of the file]
+    #[arg(id = "light.mapping", long = "env-mapping", value_name = "MAPPING")]
+    pub mapping: Option<Choice<Mapping>>,
+    /// Layer of an OpenEXR map
+    #[arg(id = "light.layer", long = "env-layer", value_name = "NAME")]
+    pub layer: Option<String>,
+    /// Number of rows of a built-in probe
+    #[arg(id = "light.rows", long = "env-rows", value_name = "ROWS", default_value = "1024")]
+    pub rows: Count<1, 16_384>,
+    /// Refuse input that is otherwise repaired or skipped with a warning: negative, NaN and infinite texels, non-finite
+    /// vertices, images and material libraries that cannot be read, and unknown extensions that a glTF file requires
+    #[arg(id = "light.strict", long = "strict")]
+    pub strict: bool,
+}
+
+impl Default for Light {
+    fn default() -> Self {
+        defaults()
+    }
+}
+
+/// The name of the probe, for messages.
+pub(crate) fn probe_name(source: &EnvironmentSource) -> String {
+    match source {
+        EnvironmentSource::File(path) => path.display().to_string(),
+        EnvironmentSource::Builtin(name) => name.clone(),
+    }
+}
+
+impl Light {
+    /// The scene's own settings, overridden by these.
+    pub fn over(&self, scene: &SceneDescription) -> EnvironmentSettings {
+        let source = |name: &str| match BuiltinProbe::from_str(name) {
+            Ok(probe) => EnvironmentSource::Builtin(probe.name().to_owned()),
+            Err(_) => EnvironmentSource::File(name.into()),
+        };
+        let plain = |source| EnvironmentSettings::new(source, scene.up.unwrap_or_default());
+        let mut settings = match (&self.map, &scene.environment) {
+            // Another probe does not inherit the first one's adjustments.
+            (Some(name), _) => plain(source(name)),
+            (None, Some(of_scene)) => of_scene.clone(),
+            (None, None) => plain(source(BuiltinProbe::Sky.name())),
+        };
+        let rotate = self.rotate.and_then(|Text(rotate)| rotate.degrees());
+        settings.rotate_degrees = rotate.unwrap_or(settings.rotate_degrees);
+        settings.scale = self.scale.map_or(settings.scale, NotNegative::get);
+        settings.exposure = self.exposure.map_or(settings.exposure, Finite::get);
+        settings.up = self.up.map_or(settings.up, |Choice(up)| up);
+        settings
+    }
+
+    /// Reads or creates the lat-long map.
+    ///
+    /// # Errors
+    /// If it cannot be read, or needs too much memory.
+    pub fn load(&self, light: &EnvironmentSettings, host: &dyn Host) -> Result<RgbImage, Error> {
+        let path = match &light.source {
+            EnvironmentSource::Builtin(name) => {
+                let probe = BuiltinProbe::from_str(name);
+                let probe = probe.map_err(|error| match &light.referrer {
+                    Some(referrer) => Error::Usage(format!("{referrer}: {error}")),
+                    None => Error::Usage(error.to_string()),
+                })?;
+                if self.layer.is_some() || self.mapping.is_some() {
+                    host.warn(&format!(
+                        "{name} is built in: its layer and mapping cannot be chosen"
+                    ));
+                }
+                let rows = u64::from(self.rows.get());
+                let bytes = Environment::MEMORY_PER_TEXEL * 2 * rows * rows;
+                host.take_memory(&format!("{name} with {rows} rows"), bytes)?;
+                return Ok(probe.image(self.rows.get() as usize));
+            }
+            EnvironmentSource::File(path) => path,
+        };
+        let options = ProbeOptions {
+            mapping: self.mapping.map(|Choice(mapping)| mapping),
+            layer: self.layer.clone(),
+            strict: self.strict,
+            max_memory: host.memory_left(),
+        };
+        host.reads(path)?;
+        let loaded = host.load_probe(path, &options);
+        let loaded = loaded.map_err(|error| of_scene_file(error, path, light))?;
+        let texels = loaded.image.pixels.len() as u64;
+        host.take_memory(&path.display().to_string(), Environment::MEMORY_PER_TEXEL * texels)?;
+        loaded.warnings.iter().for_each(|warning| host.warn(warning));
+        Ok(loaded.image)
+    }
+}
+
+/// An error in loading a probe, with the line of the scene file that names it, if there is one.
+fn of_scene_file(error: Error, path: &Path, light: &EnvironmentSettings) -> Error {
+    let Some(referrer) = &light.referrer else { return error };
+    match error {
+        Error::Probe(ProbeError::Picture(PictureError {
+            kind: PictureErrorKind::Io(source),
+            ..
+        })) => {
+            let (path, referrer) = (path.to_owned(), format!("{referrer},"));
+            LoadError::ReadReferenced { path, referrer, source }.into()
+        }
+        Error::Probe(error) => Error::At { place: referrer.clone(), error: Box::new(error.into()) },
+        other => other,
+    }
+}
