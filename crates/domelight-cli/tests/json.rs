@@ -6,7 +6,7 @@ use std::fs;
 use tempfile::TempDir;
 
 /// Small runs of every command, in an order in which each finds the files of those before.
-const RUNS: [(&str, &[&str]); 13] = [
+const RUNS: [(&str, &[&str]); 14] = [
     (
         "render",
         &[
@@ -75,6 +75,7 @@ const RUNS: [(&str, &[&str]); 13] = [
     ("lights", &["sky", "--env-rows", "32", "--sun", "-o", "sun.py"]),
     ("probe", &["sky", "--size", "32"]),
     ("figures", &["--quick", "--env-rows", "24", "--scene", "sphere", "--only", "1"]),
+    ("conventions", &[]),
     ("completions", &["bash"]),
     ("man", &["pages"]),
 ];
