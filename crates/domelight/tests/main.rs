@@ -11,6 +11,7 @@ mod examples;
 mod extraction;
 mod gltf;
 mod grid;
+mod ibl;
 mod inspect;
 mod instances;
 mod mapping;

@@ -17,6 +17,7 @@ mod convert;
 mod cube;
 mod overlap;
 
+pub(crate) use convert::from_lat_long_turned;
 pub use convert::{from_lat_long, to_lat_long};
 pub use cube::CubeLayout;
 

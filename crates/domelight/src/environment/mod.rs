@@ -8,7 +8,6 @@
 pub mod builtin;
 pub(crate) mod compact;
 mod compensation;
-pub mod convention;
 mod density;
 #[cfg(feature = "io")]
 mod guess;

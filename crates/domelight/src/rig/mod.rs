@@ -20,6 +20,7 @@ mod error;
 #[cfg(feature = "io")]
 pub mod export;
 mod extraction;
+pub mod ibl;
 mod median_cut;
 mod merge;
 mod quadrature;

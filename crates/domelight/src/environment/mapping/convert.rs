@@ -68,9 +68,23 @@ pub fn from_lat_long(image: &RgbImage, mapping: Mapping, size: (usize, usize)) -
     if turned && width.is_multiple_of(2) {
         return turned_by_half(image);
     }
+    from_lat_long_turned(image, mapping, size, 0.0)
+}
+
+/// [`from_lat_long`] of a map that is rotated about the up axis by a fraction of a full turn, counterclockwise as seen
+/// from above.
+///
+/// # Panics
+/// If the map or the size is empty.
+pub(crate) fn from_lat_long_turned(
+    image: &RgbImage,
+    mapping: Mapping,
+    (width, height): (usize, usize),
+    turn: f64,
+) -> RgbImage {
     let grid = LatLongGrid::new(image.width, image.height);
     let rows = in_order(height, |y| {
-        let mut overlap = Overlap::new(&grid, mapping, width, height);
+        let mut overlap = Overlap::new(&grid, mapping, width, height).turned(turn);
         let mut row = vec![Rgb::BLACK; width];
         for (x, pixel) in row.iter_mut().enumerate() {
             overlap.texel(x, y);

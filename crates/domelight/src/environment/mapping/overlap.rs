@@ -25,6 +25,8 @@ pub(super) struct Overlap<'a> {
     /// The size of the picture whose texels are laid over the grid.
     width: usize,
     height: usize,
+    /// How many columns the grid is turned counterclockwise, as seen from above.
+    turn: f64,
     /// The texel's outline in columns (unwrapped) and cos θ.
     outline: Vec<Point>,
     /// The signed area in each rectangle within the outline's bounds.
@@ -61,7 +63,12 @@ impl<'a> Overlap<'a> {
         height: usize,
     ) -> Self {
         let (outline, areas, shares) = (Vec::new(), Vec::new(), Vec::new());
-        Self { grid, mapping, width, height, outline, areas, shares }
+        Self { grid, mapping, width, height, turn: 0.0, outline, areas, shares }
+    }
+
+    /// The overlap with the grid turned by a fraction of a full turn, counterclockwise as seen from above.
+    pub(super) fn turned(self, turn: f64) -> Self {
+        Self { turn: turn.rem_euclid(1.0) * self.grid.width() as f64, ..self }
     }
 
     /// Fills [`Overlap::shares`] with those of texel (x, y).
@@ -173,6 +180,7 @@ impl<'a> Overlap<'a> {
         if self.outline.iter().flatten().any(|c| !c.is_finite()) {
             return;
         }
+        self.outline.iter_mut().for_each(|point| point[0] += self.turn);
         let fold = |f: fn(f64, f64) -> f64, i: usize| {
             self.outline.iter().map(|p| p[i]).reduce(f).unwrap_or(0.0)
         };

@@ -1,0 +1,163 @@
+//! How engines look up prefiltered light.
+//!
+//! Read in the engines' sources; docs/ibl.md says what of it was proved.
+
+use std::str::FromStr;
+
+use super::brdf::TableTerms;
+use super::cube::CubeAxes;
+use crate::math::{Vec3, functions};
+
+/// An engine that prefiltered light is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Engine {
+    /// three.js.
+    Three,
+    /// Google's Filament.
+    Filament,
+    /// Babylon.js.
+    Babylon,
+    /// Godot 4.
+    Godot,
+    /// Bevy.
+    Bevy,
+    /// Unreal Engine 5.
+    Unreal,
+}
+
+/// The levels below which Filament's tool does not go: 16 columns.
+const FILAMENT_SMALLEST: usize = 16;
+
+/// `lodGenerationScale` of Babylon.js: levels per octave of α.
+const BABYLON_SCALE: f32 = 0.8;
+
+/// `REFLECTION_CAPTURE_ROUGHNESS_MIP_SCALE` of Unreal: levels per octave of r.
+const UNREAL_SCALE: f32 = 1.2;
+
+/// The roughness of levels 0 to `last`: of a mirror, then `rough`, up to 1.
+fn with_mirror(last: u32, rough: impl Fn(u32) -> f32) -> Vec<f32> {
+    (0..=last).map(|level| if level == 0 { 0.0 } else { rough(level).min(1.0) }).collect()
+}
+
+impl Engine {
+    /// All engines.
+    pub const ALL: [Self; 6] =
+        [Self::Three, Self::Filament, Self::Babylon, Self::Godot, Self::Bevy, Self::Unreal];
+
+    /// The name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Three => "three",
+            Self::Filament => "filament",
+            Self::Babylon => "babylon",
+            Self::Godot => "godot",
+            Self::Bevy => "bevy",
+            Self::Unreal => "unreal",
+        }
+    }
+
+    /// How a cube stands in the world so that the engine shows the map as it shows a panorama that it loads itself: with
+    /// the center column in the engine's own direction, and not mirrored.
+    pub const fn axes(self) -> CubeAxes {
+        let world = match self {
+            // The center of a panorama is +X, its right half +Z; cubes are looked up with −x (`flipEnvMap`).
+            Self::Three => [Vec3::Z, Vec3::Y, Vec3::X],
+            // The center is +Z, its right half −X; cubes are looked up with the world direction.
+            Self::Filament | Self::Godot => [Vec3::NEG_X, Vec3::Y, Vec3::NEG_Z],
+            // The world is left-handed; the center is +Z, its right half +X.
+            Self::Babylon => [Vec3::X, Vec3::Y, Vec3::NEG_Z],
+            // Panoramas face the camera's −Z; cubes are looked up with −z.
+            Self::Bevy => [Vec3::X, Vec3::Y, Vec3::NEG_Z],
+            // The world is left-handed with +Z up; the center is +X, its right half +Y.
+            Self::Unreal => [Vec3::NEG_Z, Vec3::X, Vec3::Y],
+        };
+        CubeAxes { world }
+    }
+
+    /// The perceptual roughness of each level of a cube whose faces have `size` columns: level 0 is a mirror.
+    pub fn roughness(self, size: usize) -> Vec<f32> {
+        let last = size.max(1).ilog2();
+        match self {
+            Self::Three | Self::Godot | Self::Bevy => {
+                (0..=last).map(|level| level as f32 / last.max(1) as f32).collect()
+            }
+            // The shader looks up level r (2 − r) · last.
+            Self::Filament => {
+                let last = (size / FILAMENT_SMALLEST).max(1).ilog2();
+                let level = |level: u32| 1.0 - (1.0 - level as f32 / last.max(1) as f32).sqrt();
+                (0..=last).map(level).collect()
+            }
+            // The shader looks up level 0.8 log2(size · α).
+            Self::Babylon => {
+                let alpha =
+                    |level: u32| functions::exp2(level as f32 / BABYLON_SCALE) / size as f32;
+                with_mirror(last, |level| alpha(level).sqrt())
+            }
+            // The shader looks up level last − 1 + 1.2 log2 r.
+            Self::Unreal => {
+                let from_rough = |level: u32| level as f32 + 1.0 - last as f32;
+                with_mirror(last, |level| functions::exp2(from_rough(level) / UNREAL_SCALE))
+            }
+        }
+    }
+
+    /// What the engine's table of the BRDF holds.
+    pub const fn table(self) -> TableTerms {
+        match self {
+            Self::Three | Self::Godot | Self::Bevy | Self::Unreal => TableTerms::ScaleAndBias,
+            Self::Filament => TableTerms::BiasAndTotalUpward,
+            Self::Babylon => TableTerms::BiasAndTotal,
+        }
+    }
+}
+
+/// No engine has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown engine {name:?}; known are {}", Engine::ALL.map(Engine::name).join(", "))]
+pub struct UnknownEngine {
+    /// The given name.
+    pub name: String,
+}
+
+impl FromStr for Engine {
+    type Err = UnknownEngine;
+
+    fn from_str(name: &str) -> Result<Self, UnknownEngine> {
+        let found = Self::ALL.into_iter().find(|engine| engine.name() == name);
+        found.ok_or_else(|| UnknownEngine { name: name.to_owned() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Right-handed engines that look up −x or −z have mirrored cubes; the others have turned ones.
+    #[test]
+    fn cubes_are_mirrored_where_the_engine_mirrors_them() {
+        for engine in Engine::ALL {
+            let [x, y, z] = engine.axes().world;
+            let handedness = x.cross(y).dot(z);
+            let expected = match engine {
+                Engine::Filament | Engine::Godot => 1.0,
+                Engine::Three | Engine::Babylon | Engine::Bevy | Engine::Unreal => -1.0,
+            };
+            assert_eq!(handedness, expected, "{}", engine.name());
+            assert_eq!(engine.name().parse(), Ok(engine));
+        }
+    }
+
+    #[test]
+    fn levels_grow_rougher() {
+        for engine in Engine::ALL {
+            for size in [1, 2, 16, 48, 256, 1024] {
+                let roughness = engine.roughness(size);
+                assert_eq!(roughness[0], 0.0);
+                assert!(roughness.len() <= size.ilog2() as usize + 1);
+                assert!(roughness.windows(2).all(|pair| pair[0] < pair[1] || pair[0] == 1.0));
+                assert!(roughness.iter().all(|r| (0.0..=1.0).contains(r)));
+            }
+        }
+        assert_eq!(Engine::Filament.roughness(256).len(), 5);
+    }
+}
