@@ -19,6 +19,7 @@ use domelight::picture::PictureErrorKind;
 use domelight::picture::compare::SizeMismatch;
 use domelight::quote::terminal;
 use domelight::render::CheckpointError;
+use domelight::rig::ibl::IblError;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{CameraError, LoadError, SceneError};
 use domelight::strategy::PrepareError;
@@ -81,6 +82,7 @@ fn code(error: &anyhow::Error) -> u8 {
             || cause.is::<CameraError>()
             || cause.is::<EnvironmentError>()
             || cause.is::<CheckpointError>()
+            || cause.is::<IblError>()
             || cause.is::<FileConflict>()
     };
     let is_permanent = error.is::<UsageError>()

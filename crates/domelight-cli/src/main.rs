@@ -10,13 +10,13 @@ mod bench;
 mod clock;
 mod command_line;
 mod compare;
-mod conventions;
 mod diff;
 mod error;
 mod exit;
 mod farm;
 mod figures;
 mod files;
+mod ibl;
 mod inspect;
 mod interrupt;
 mod job;
@@ -60,8 +60,8 @@ fn main() -> ExitCode {
         Command::Bench(arguments) => bench::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Lights(arguments) => lights::run(&arguments, quiet),
+        Command::Ibl(arguments) => ibl::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
-        Command::Conventions(arguments) => conventions::run(&arguments),
         Command::Schema => output::print_json(&domelight_lab::job::schema()),
         Command::Tone(arguments) => tone::run(&arguments, quiet),
         Command::Figures(arguments) => figures::run(&arguments, quiet),

@@ -31,6 +31,12 @@ impl std::str::FromStr for MaxMemory {
 /// For each texel of a probe whose light is taken out: the map, what is left of it, and where lamps are.
 pub(crate) const EXTRACTION_TEXEL: u64 = 64;
 
+/// For each texel of a cube of prefiltered light: the texel, its level's bytes and the work on it.
+pub(crate) const IBL_TEXEL: u64 = 64;
+
+/// The hierarchy over the texels of a map that is prefiltered, at the most.
+pub(crate) const IBL_HIERARCHY: u64 = 128 << 20;
+
 /// For each texel of a map that is computed or converted.
 pub(crate) const MAP_TEXEL: u64 = 24;
 

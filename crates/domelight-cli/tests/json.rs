@@ -73,9 +73,9 @@ const RUNS: [(&str, &[&str]); 14] = [
         ],
     ),
     ("lights", &["sky", "--env-rows", "32", "--sun", "-o", "sun.py"]),
+    ("ibl", &["sky", "--env-rows", "16", "--size", "4", "-o", "cube.ktx2"]),
     ("probe", &["sky", "--size", "32"]),
     ("figures", &["--quick", "--env-rows", "24", "--scene", "sphere", "--only", "1"]),
-    ("conventions", &[]),
     ("completions", &["bash"]),
     ("man", &["pages"]),
 ];

@@ -9,6 +9,7 @@ mod diff_and_probe;
 mod farm;
 mod figures;
 mod hostile;
+mod ibl;
 mod inspect;
 mod job;
 mod json;

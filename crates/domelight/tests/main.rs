@@ -26,6 +26,7 @@ mod rig_export;
 mod scene_bytes;
 mod scene_loaders;
 mod tables;
+mod textures;
 mod tone;
 mod unbiased;
 mod variance;

@@ -10,7 +10,6 @@ use clap::builder::{
     MapValueParser, PossibleValue, PossibleValuesParser, TypedValueParser as _, ValueParserFactory,
 };
 use domelight::environment::UpAxis;
-use domelight::environment::convention::Convention;
 use domelight::environment::mapping::Mapping;
 use domelight::math::{Vec3, vec3};
 use domelight::picture::tone::ToneCurve;
@@ -523,16 +522,6 @@ impl Named for Filter {
 }
 
 impl Named for Mapping {
-    fn all() -> Vec<Self> {
-        Self::ALL.to_vec()
-    }
-
-    fn name(self) -> &'static str {
-        self.name()
-    }
-}
-
-impl Named for Convention {
     fn all() -> Vec<Self> {
         Self::ALL.to_vec()
     }

@@ -18,6 +18,7 @@ pub mod hdr;
 pub mod pfm;
 pub mod png;
 mod primaries;
+pub mod texture;
 pub mod tone;
 
 pub use crate::files::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};

@@ -1,0 +1,312 @@
+//! `domelight ibl`: prefilters a light probe for an engine.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use domelight::environment::Environment;
+use domelight::files::create_folder;
+use domelight::picture::exr::ExrLayers;
+use domelight::picture::texture::{ClippedLight, TexelFormat, Texture, dds, ktx2};
+use domelight::rig::ibl::{
+    BrdfTable, Cube, Engine, IblSettings, PrefilteredLight, TableTerms, prefilter,
+};
+use domelight::rig::{ExtractionSettings, RigError, RigLight, extract};
+use domelight::scene::SceneDescription;
+use domelight::{Rgb, RgbImage};
+use serde_json::{Value, json};
+
+use crate::args::ibl::{Container, IblArguments, IblPath, SunTreatment, TexturePath};
+use crate::error::{UsageError, warn};
+use crate::files;
+use crate::memory;
+use crate::output::{print, print_json};
+use crate::scene::without_camera;
+use crate::terminal::Terminal;
+use domelight_lab::names::file_name;
+
+/// Columns of the table of the BRDF.
+const TABLE_SIZE: usize = 128;
+
+/// Columns of a face of the irradiance cube.
+const IRRADIANCE_SIZE: usize = 32;
+
+/// Runs the subcommand.
+pub(crate) fn run(arguments: &IblArguments, quiet: bool) -> Result<()> {
+    let settings = arguments.settings();
+    let results = Results::of(arguments, settings.roughness.len());
+    results.declare()?;
+    let (environment, probe) = arguments.load(&settings, quiet)?;
+    let (environment, sun) = arguments.treat_sun(environment, &probe, quiet)?;
+    let light = prefilter(&environment, &settings).with_context(|| probe.clone())?;
+    let (radiance, clipped) = Texture::cube(&light.levels, arguments.texels.into());
+    arguments.report_clipped(clipped, &probe, quiet)?;
+    results.write(arguments, &light, &radiance, &json_of(&light, &settings, sun.as_ref()))?;
+    if arguments.json {
+        let mut report = json_of(&light, &settings, sun.as_ref());
+        report["probe"] = probe.into();
+        report["engine"] = arguments.engine.map(Engine::name).into();
+        report["clipped"] = json!({ "texels": clipped.texels, "lost": clipped.lost });
+        let names = results.files.iter().map(|(path, _)| path.to_string_lossy().into_owned());
+        report["files"] = names.collect();
+        return print_json(&report);
+    }
+    if quiet {
+        return Ok(());
+    }
+    let line = |(path, content): &(PathBuf, Content)| {
+        format!("-> {}: {}", path.display(), content.description(&settings))
+    };
+    print(&results.files.iter().map(line).collect::<Vec<_>>().join("\n"))
+}
+
+impl IblArguments {
+    fn settings(&self) -> IblSettings {
+        let linear = IblSettings::linear(self.size as usize);
+        let settings = match self.engine {
+            None => linear,
+            Some(engine) => IblSettings {
+                roughness: engine.roughness(self.size as usize),
+                axes: engine.axes(),
+                ..linear
+            },
+        };
+        IblSettings { irradiance_size: IRRADIANCE_SIZE.min(settings.size), ..settings }
+    }
+
+    fn load(&self, settings: &IblSettings, quiet: bool) -> Result<(Environment, String)> {
+        let given = without_camera(&self.light)?;
+        let light = given.over(&SceneDescription::default());
+        let map = given.load(&light, &Terminal { quiet })?;
+        let probe = self.light.map.clone().unwrap_or_default();
+        let cubes = 8 * settings.size.pow(2) as u64;
+        let treated = match self.sun {
+            SunTreatment::Keep => 0,
+            SunTreatment::Remove | SunTreatment::Clamp(_) => memory::EXTRACTION_TEXEL,
+        };
+        let bytes = cubes * memory::IBL_TEXEL
+            + memory::IBL_HIERARCHY
+            + (Environment::MEMORY_PER_TEXEL + treated) * map.pixels.len() as u64;
+        memory::allow(&format!("{probe}: its prefiltered light"), bytes)?;
+        let environment = light.environment(map).with_context(|| probe.clone())?;
+        Ok((environment, file_name(&probe)))
+    }
+
+    /// The environment with the sun kept, removed or clamped, and the removed sun.
+    fn treat_sun(
+        &self,
+        environment: Environment,
+        probe: &str,
+        quiet: bool,
+    ) -> Result<(Environment, Option<RigLight>)> {
+        match self.sun {
+            SunTreatment::Keep => Ok((environment, None)),
+            SunTreatment::Clamp(radiance) => {
+                let (clamped, lost) = clamped(&environment, radiance)?;
+                if lost > 0.0 {
+                    let percent = 100.0 * lost;
+                    warn(quiet, &format!("{probe}: clamped to {radiance}, -{percent:.2} % light"));
+                }
+                Ok((clamped, None))
+            }
+            SunTreatment::Remove => {
+                let settings = ExtractionSettings { sun: true, ..ExtractionSettings::default() };
+                let extraction = match extract(&environment, settings) {
+                    Err(error @ RigError::NoSun { .. }) if !self.light.strict => {
+                        warn(quiet, &format!("{probe}: {error}; nothing is removed"));
+                        return Ok((environment, None));
+                    }
+                    extraction => extraction.with_context(|| probe.to_owned())?,
+                };
+                let Some(residual) = extraction.residual else {
+                    let text = format!("{probe}: all of its light is the sun; nothing is left");
+                    return Err(UsageError(text).into());
+                };
+                Ok((residual, extraction.rig.lights.first().copied()))
+            }
+        }
+    }
+
+    /// States what the format cannot hold.
+    fn report_clipped(&self, clipped: ClippedLight, probe: &str, quiet: bool) -> Result<()> {
+        if clipped.texels == 0 {
+            return Ok(());
+        }
+        let largest = TexelFormat::from(self.texels).largest();
+        let text = format!(
+            "{probe}: {} texels are brighter than {largest}, the most that the format holds, and are clipped: level 0 \
+             loses {:.2} % of its light; rougher levels are filtered before that",
+            clipped.texels,
+            100.0 * clipped.lost
+        );
+        if self.light.strict {
+            return Err(UsageError(format!("{text}; without --strict it is clipped")).into());
+        }
+        warn(quiet, &text);
+        Ok(())
+    }
+
+    fn terms(&self) -> TableTerms {
+        self.engine.map_or(TableTerms::ScaleAndBias, Engine::table)
+    }
+}
+
+/// The environment with every texel scaled until its brightest channel is at most `radiance`, and the share of the light
+/// that is lost.
+fn clamped(environment: &Environment, radiance: f32) -> Result<(Environment, f64)> {
+    let mut map = environment.radiance_map().into_owned();
+    for texel in &mut map.pixels {
+        let brightest = texel.max_component();
+        if brightest > radiance {
+            *texel *= radiance / brightest;
+        }
+    }
+    let clamped = Environment::new(map, environment.orientation(), 1.0)?;
+    let [before, after] = [environment, &clamped].map(|e| e.power() * e.unit());
+    let lost = if before > 0.0 { (1.0 - after / before).max(0.0) } else { 0.0 };
+    Ok((clamped, lost))
+}
+
+/// What a file holds.
+#[derive(Clone, Copy, Debug)]
+enum Content {
+    /// All levels.
+    Radiance(Container),
+    Irradiance(Container),
+    Table(Container),
+    /// One level as a strip of faces.
+    LevelPicture(usize),
+    IrradiancePicture,
+    /// Levels and coefficients.
+    Description,
+}
+
+impl Content {
+    fn description(self, settings: &IblSettings) -> String {
+        let IblSettings { size, roughness, .. } = settings;
+        match self {
+            Self::Radiance(_) => {
+                format!("a cube of {size}x{size} texels with {} levels", roughness.len())
+            }
+            Self::Irradiance(_) => "irradiance over π, a cube".into(),
+            Self::Table(_) => {
+                "the table of the BRDF: cos θ to the right, roughness downward".into()
+            }
+            Self::LevelPicture(level) => {
+                format!("level {level}, roughness {:.3}, six faces", roughness[level])
+            }
+            Self::IrradiancePicture => "irradiance over π, six faces".into(),
+            Self::Description => "levels and spherical harmonics".into(),
+        }
+    }
+}
+
+/// The files of a run.
+struct Results {
+    folder: Option<PathBuf>,
+    files: Vec<(PathBuf, Content)>,
+}
+
+impl Results {
+    fn of(arguments: &IblArguments, n_levels: usize) -> Self {
+        let mut files = Vec::new();
+        let folder = match &arguments.output {
+            IblPath::File(TexturePath { path, container }) => {
+                files.push((path.clone(), Content::Radiance(*container)));
+                None
+            }
+            IblPath::Folder(folder) => {
+                let mut add = |name: &str, content| files.push((folder.join(name), content));
+                add("radiance.ktx2", Content::Radiance(Container::Ktx2));
+                add("irradiance.ktx2", Content::Irradiance(Container::Ktx2));
+                add("brdf.ktx2", Content::Table(Container::Ktx2));
+                for level in 0..n_levels {
+                    add(&format!("radiance_{level:02}.exr"), Content::LevelPicture(level));
+                }
+                add("irradiance.exr", Content::IrradiancePicture);
+                add("ibl.json", Content::Description);
+                Some(folder.clone())
+            }
+        };
+        let mut also = |file: &Option<TexturePath>, content: fn(Container) -> Content| {
+            files.extend(file.iter().map(|file| (file.path.clone(), content(file.container))));
+        };
+        also(&arguments.irradiance, Content::Irradiance);
+        also(&arguments.brdf, Content::Table);
+        Self { folder, files }
+    }
+
+    /// Declares all files before the work.
+    fn declare(&self) -> Result<()> {
+        let is_new = self.folder.as_ref().is_some_and(|folder| !folder.is_dir());
+        for (path, _) in &self.files {
+            let in_new = is_new && path.parent() == self.folder.as_deref();
+            if in_new { files::declare(path)? } else { files::writes(path)? }
+        }
+        Ok(())
+    }
+
+    fn write(
+        &self,
+        arguments: &IblArguments,
+        light: &PrefilteredLight,
+        radiance: &Texture,
+        description: &Value,
+    ) -> Result<()> {
+        if let Some(folder) = &self.folder {
+            create_folder(folder).with_context(|| folder.display().to_string())?;
+        }
+        for (path, content) in &self.files {
+            match content {
+                Content::Radiance(container) => write_texture(path, *container, radiance)?,
+                Content::Irradiance(container) => {
+                    let levels = std::slice::from_ref(&light.irradiance);
+                    let (texture, _) = Texture::cube(levels, arguments.texels.into());
+                    write_texture(path, *container, &texture)?;
+                }
+                Content::Table(container) => {
+                    let table = BrdfTable::new(TABLE_SIZE, arguments.terms());
+                    write_texture(path, *container, &Texture::table(&table))?;
+                }
+                Content::LevelPicture(level) => write_strip(path, &light.levels[*level])?,
+                Content::IrradiancePicture => write_strip(path, &light.irradiance)?,
+                Content::Description => {
+                    let text = serde_json::to_string_pretty(description)?;
+                    files::write(path, |out| writeln!(out, "{text}"))?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn write_texture(path: &Path, container: Container, texture: &Texture) -> Result<()> {
+    files::write(path, |out| match container {
+        Container::Ktx2 => ktx2::encode(texture, out),
+        Container::Dds => dds::encode(texture, out),
+    })
+}
+
+/// The faces of a cube from top to bottom.
+fn write_strip(path: &Path, cube: &Cube) -> Result<()> {
+    let picture = RgbImage::new(cube.size, 6 * cube.size, cube.texels.clone());
+    let bytes = ExrLayers::from_image(&picture, None).encode()?;
+    files::write(path, |out| out.write_all(&bytes))
+}
+
+/// Levels, harmonics and the removed sun.
+fn json_of(light: &PrefilteredLight, settings: &IblSettings, sun: Option<&RigLight>) -> Value {
+    let levels = light.levels.iter().zip(&settings.roughness);
+    let level =
+        |(cube, roughness): (&Cube, &f32)| json!({ "size": cube.size, "roughness": roughness });
+    json!({
+        "levels": levels.map(level).collect::<Vec<_>>(),
+        "irradiance_size": light.irradiance.size,
+        "harmonics": light.harmonics.coefficients.map(Rgb::to_array),
+        "axes": settings.axes.world.map(|axis| axis.to_array()),
+        "sun": sun.map(|sun| json!({
+            "direction": sun.direction.to_array(),
+            "irradiance": sun.irradiance.to_array(),
+            "angular_radius": sun.angular_radius,
+        })),
+    })
+}

@@ -1,0 +1,182 @@
+//! Textures as graphics interfaces take them: cubes with a chain of levels and tables, in KTX2 and DDS files (written
+//! only).
+
+pub mod dds;
+pub mod ktx2;
+
+use half::f16;
+
+use crate::Rgb;
+use crate::math::functions;
+use crate::rig::ibl::{BrdfTable, Cube};
+
+/// The format of a texel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TexelFormat {
+    /// RGB9E5: three mantissas of 9 bits and a common exponent, at the most 65408; 4 bytes.
+    SharedExponent,
+    /// RGBA of half precision with alpha 1, at the most 65504; 8 bytes.
+    Half,
+    /// Two numbers of half precision; 4 bytes.
+    HalfPair,
+}
+
+impl TexelFormat {
+    /// The size of a texel in bytes.
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::SharedExponent | Self::HalfPair => 4,
+            Self::Half => 8,
+        }
+    }
+
+    /// The largest value of a channel.
+    pub const fn largest(self) -> f32 {
+        match self {
+            Self::SharedExponent => 65408.0,
+            Self::Half | Self::HalfPair => 65504.0,
+        }
+    }
+}
+
+/// A square texture, or a cube of six.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    /// The number of columns, and of rows, of level 0.
+    pub size: usize,
+    /// 6 for a cube, whose faces are +X, −X, +Y, −Y, +Z, −Z; otherwise 1.
+    pub faces: usize,
+    /// The format of a texel.
+    pub format: TexelFormat,
+    /// The bytes of each level, face by face and row by row from the top. Each level halves the size, rounded down.
+    pub levels: Vec<Vec<u8>>,
+}
+
+/// Radiance above the largest value of a format.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ClippedLight {
+    /// The number of clipped texels in all levels.
+    pub texels: usize,
+    /// The share of the light of level 0 that is lost, in \[0, 1\].
+    pub lost: f64,
+}
+
+impl Texture {
+    /// The levels of a cube, and what was clipped. Negative and NaN channels become 0.
+    pub fn cube(levels: &[Cube], format: TexelFormat) -> (Self, ClippedLight) {
+        let largest = format.largest();
+        let is_clipped = |texel: &&Rgb| texel.max_component() > largest;
+        let texels = levels.iter().flat_map(|cube| &cube.texels).filter(is_clipped).count();
+        let lost = levels.first().map_or(0.0, |cube| lost_light(cube, largest));
+        let encode = |cube: &Cube| cube.texels.iter().flat_map(|&t| encode(format, t)).collect();
+        let size = levels.first().map_or(0, |cube| cube.size);
+        let levels = levels.iter().map(encode).collect();
+        (Self { size, faces: 6, format, levels }, ClippedLight { texels, lost })
+    }
+
+    /// A table of the BRDF, as pairs of half precision.
+    pub fn table(table: &BrdfTable) -> Self {
+        let bytes = |pair: &[f32; 2]| pair.map(|c| f16::from_f32(c).to_le_bytes()).concat();
+        let level = table.texels.iter().flat_map(bytes).collect();
+        Self { size: table.size, faces: 1, format: TexelFormat::HalfPair, levels: vec![level] }
+    }
+
+    /// The number of columns of a level.
+    fn level_size(&self, level: usize) -> usize {
+        (self.size >> level).max(1)
+    }
+}
+
+/// The share of a cube's light above `largest`.
+fn lost_light(cube: &Cube, largest: f32) -> f64 {
+    let mut sums = [0.0; 2];
+    for (i, texel) in cube.texels.iter().enumerate() {
+        let within = i % (cube.size * cube.size);
+        let along = |i: usize| (2 * i + 1) as f64 / cube.size as f64 - 1.0;
+        let (s, t) = (along(within % cube.size), along(within / cube.size));
+        let distance2 = 1.0 + s * s + t * t;
+        let weight = 1.0 / (distance2 * distance2.sqrt());
+        for c in texel.to_array() {
+            sums[0] += weight * f64::from((c - largest).max(0.0));
+            sums[1] += weight * f64::from(c);
+        }
+    }
+    if sums[1] > 0.0 { sums[0] / sums[1] } else { 0.0 }
+}
+
+/// The bytes of a texel.
+fn encode(format: TexelFormat, texel: Rgb) -> Vec<u8> {
+    let clipped = texel.map(|c| c.max(0.0).min(format.largest()));
+    match format {
+        TexelFormat::SharedExponent => shared_exponent(clipped).to_le_bytes().to_vec(),
+        TexelFormat::Half | TexelFormat::HalfPair => {
+            let [r, g, b] = clipped.to_array();
+            let channels = [r, g, b, 1.0].map(|c| f16::from_f32(c).to_le_bytes());
+            channels.concat()[..format.bytes()].to_vec()
+        }
+    }
+}
+
+/// Red in the lowest bits, the exponent in the highest: `GL_EXT_texture_shared_exponent`, section 3.8.x.
+fn shared_exponent(texel: Rgb) -> u32 {
+    const MANTISSA_BITS: i32 = 9;
+    const BIAS: i32 = 15;
+    let largest = texel.max_component();
+    // ⌊log₂⌋ from the exponent of single precision, exact; numbers below 2⁻¹⁶ share the lowest exponent.
+    let log = ((largest.to_bits() >> 23) as i32 - 127).max(-BIAS - 1);
+    let round = |c: f32, exponent: i32| {
+        let unit = functions::powi(2f64, exponent - BIAS - MANTISSA_BITS);
+        (f64::from(c) / unit + 0.5).floor() as u32
+    };
+    let mut exponent = log + 1 + BIAS;
+    if round(largest, exponent) == 1 << MANTISSA_BITS {
+        exponent += 1;
+    }
+    let [r, g, b] = texel.to_array().map(|c| round(c, exponent));
+    r | g << 9 | b << 18 | (exponent as u32) << 27
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decoded(bits: u32) -> [f64; 3] {
+        let unit = 2f64.powi((bits >> 27) as i32 - 24);
+        [0, 9, 18].map(|shift| f64::from(bits >> shift & 511) * unit)
+    }
+
+    #[test]
+    fn shared_exponents_round_to_nearest() {
+        for i in 0..20_000u32 {
+            let c = |k: u32| {
+                let x = (i * 97 + k * 31) % 4001;
+                2f32.powf(x as f32 / 4001.0 * 34.0 - 18.0) * (1.0 + x as f32 / 8002.0)
+            };
+            let texel = Rgb::new(c(0), c(1), c(2)).map(|c| c.min(65408.0));
+            let largest = f64::from(texel.max_component());
+            // Half a step of the 9-bit mantissa of the largest channel, whose exponent may have been raised.
+            let step = (largest / 256.0).max(2f64.powi(-24));
+            for (a, b) in texel.to_array().into_iter().zip(decoded(shared_exponent(texel))) {
+                assert!((f64::from(a) - b).abs() <= 0.5001 * step, "{texel:?}: {b}");
+            }
+        }
+        assert_eq!(decoded(shared_exponent(Rgb::WHITE)), [1.0; 3]);
+        assert_eq!(decoded(shared_exponent(Rgb::BLACK)), [0.0; 3]);
+        assert_eq!(decoded(shared_exponent(Rgb::splat(65408.0))), [65408.0; 3]);
+        assert_eq!(decoded(shared_exponent(Rgb::splat(511.9))), [512.0; 3]);
+    }
+
+    #[test]
+    fn clipped_light_is_counted() {
+        let mut texels = vec![Rgb::WHITE; 24];
+        texels[3] = Rgb::splat(2e5);
+        let cube = Cube { size: 2, texels };
+        let (texture, clipped) = Texture::cube(&[cube], TexelFormat::Half);
+        assert_eq!(clipped.texels, 1);
+        let expected = (2e5 - 65504.0) / (2e5 + 23.0);
+        assert!((clipped.lost - expected).abs() < 1e-9, "{clipped:?}");
+        assert_eq!(texture.levels[0].len(), 24 * 8);
+        assert_eq!(encode(TexelFormat::Half, Rgb::splat(f32::NAN))[..2], [0, 0]);
+        assert_eq!(encode(TexelFormat::SharedExponent, Rgb::splat(-1.0)), [0; 4]);
+    }
+}
