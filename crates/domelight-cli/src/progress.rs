@@ -6,8 +6,9 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use domelight::quote::terminal;
-use domelight::render::{Counts, Observer, Stage};
+use domelight::render::{Counts, Layers, Observer, Stage, TileView};
 use domelight_lab::WorkProgress;
+use domelight_lab::display::Display;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::output::print_progress;
@@ -30,6 +31,8 @@ pub(crate) struct RenderProgress {
     told: Mutex<Option<u64>>,
     started: Instant,
     profile: Option<Profile>,
+    /// The viewer that shows the picture while it is made.
+    display: Option<Display>,
 }
 
 impl RenderProgress {
@@ -63,6 +66,7 @@ impl RenderProgress {
             told,
             started: Instant::now(),
             profile: None,
+            display: None,
         }
     }
 
@@ -85,6 +89,17 @@ impl RenderProgress {
     pub(crate) fn profiled(mut self, on: bool) -> Self {
         self.profile = on.then(Profile::default);
         self
+    }
+
+    /// Shows the picture in a viewer, too.
+    pub(crate) fn displayed(mut self, display: Option<Display>) -> Self {
+        self.display = display;
+        self
+    }
+
+    /// Shows the finished picture in the viewer, if there is one; returns why that failed.
+    pub(crate) fn display(&self, layers: &Layers) -> Option<std::io::Error> {
+        self.display.as_ref()?.finish(layers).err()
     }
 
     /// What each stage took, if that was measured.
@@ -145,6 +160,12 @@ impl Observer for RenderProgress {
     fn stage_started(&self, stage: Stage) {
         if let Some(profile) = &self.profile {
             profile.begin(Some(stage));
+        }
+    }
+
+    fn tile_rendered(&self, tile: &TileView) {
+        if let Some(display) = &self.display {
+            display.show(tile);
         }
     }
 

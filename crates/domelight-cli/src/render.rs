@@ -26,7 +26,10 @@ use crate::terminal::Terminal;
 use crate::tone::Shown;
 use crate::turntable::{Frame, Turntable};
 use domelight_lab::denoise::Denoiser;
-use domelight_lab::job::value::{Rotation, Text};
+use domelight_lab::display::Display;
+use domelight_lab::job::Job;
+use domelight_lab::job::value::{Rotation, Size, Text};
+use domelight_lab::names::file_name;
 use domelight_lab::scene::PreparedScene;
 use domelight_lab::{Stopwatch, refuse_repeating_points};
 
@@ -57,6 +60,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     start_threads(arguments.threads.threads)?;
     // Before the work that would be in vain.
     let denoiser = arguments.output.denoise.then(Denoiser::load).transpose()?;
+    let display = arguments.output.display.as_deref();
+    let display = display.map(|address| connect(address, &job)).transpose()?;
     let interrupted = interrupt::flag();
     let loading = interrupt::nothing_to_keep(arguments.render_run.code_of_an_early_end());
     let mut watch = Stopwatch::start();
@@ -109,7 +114,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let openjd = arguments.output.progress == ProgressKind::Openjd;
     let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
     let progress = progress.pictures(turntable.as_ref().map_or(1, Turntable::len));
-    let progress = &progress.profiled(arguments.output.profile);
+    let progress = &progress.profiled(arguments.output.profile).displayed(display);
     let attributes = described.provenance(settings);
     let try_writing = &|layers: &Layers| {
         output::time_to_write(&outputs, layers, &shown_as, report.hide_env, &attributes)
@@ -145,6 +150,12 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         warn(quiet, reason);
     }
 
+    if turntable.is_none()
+        && !arguments.render_run.is_part()
+        && let Some(error) = progress.display(&rendering.layers)
+    {
+        warn(quiet, &format!("--display: the viewer did not take the whole picture: {error}"));
+    }
     // A part is its own checkpoint, and written.
     if turntable.is_none() && !arguments.render_run.is_part() {
         denoised = pictures.write(&rendering, None, &outputs)?;
@@ -171,6 +182,15 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         }
     }
     report.check(saved, arguments.render_run.is_part(), quiet)
+}
+
+/// The viewer that listens at an address.
+fn connect(address: &str, job: &Job) -> Result<Display> {
+    let Text(Size { width, height }) = job.view.size;
+    let name = file_name(&job.scene);
+    Display::connect(address, &name, [width, height]).with_context(|| {
+        format!("--display: no viewer listens at {address}; start tev or HDRView first")
+    })
 }
 
 /// How pictures are written.

@@ -12,7 +12,7 @@ mod timed;
 use anyhow::{Context as _, Result};
 use domelight::render::{
     Checkpoint, Counts, Layers, Observer, Passes, RenderSettings, Renderer, Rendering, Stage,
-    Tiling,
+    TileView, Tiling,
 };
 use domelight::strategy::{Strategy, StrategySpec};
 
@@ -458,6 +458,10 @@ impl Observer for Deadline<'_> {
     fn tile_finished(&self, counts: &Counts) {
         self.progress.tile_finished(counts);
         self.advanced.store(true, Ordering::Relaxed);
+    }
+
+    fn tile_rendered(&self, tile: &TileView) {
+        self.progress.tile_rendered(tile);
     }
 
     fn canceled(&self) -> bool {

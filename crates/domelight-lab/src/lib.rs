@@ -31,6 +31,7 @@ pub mod black;
 pub mod compare;
 pub mod denoise;
 mod depth_of_field;
+pub mod display;
 mod error;
 pub mod figures;
 mod ground;

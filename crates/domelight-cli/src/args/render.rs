@@ -2,6 +2,7 @@
 
 use clap::{Args, ValueEnum};
 
+use domelight_lab::display;
 use domelight_lab::job::{Given, Job};
 
 use super::ThreadArguments;
@@ -61,6 +62,10 @@ pub(crate) struct OutputArguments {
     /// Print settings, times and counts as JSON to standard output
     #[arg(long)]
     pub(crate) json: bool,
+    /// Show the picture while it is made in a viewer that listens at this address, such as tev or HDRView [default
+    /// address: 127.0.0.1:14158]
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, require_equals = true, default_missing_value = display::ADDRESS)]
+    pub(crate) display: Option<String>,
     /// First write PNG output at half size after one sample, as a preview of the rest
     #[arg(long)]
     pub(crate) preview: bool,

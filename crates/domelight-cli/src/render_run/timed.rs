@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use domelight::render::{Counts, Observer, Stage};
+use domelight::render::{Counts, Observer, Stage, TileView};
 
 use crate::progress::RenderProgress;
 
@@ -170,6 +170,10 @@ impl Observer for PassWatch<'_> {
         self.tiles.fetch_add(1, Ordering::Relaxed);
         self.camera_rays.fetch_add(counts.camera_rays, Ordering::Relaxed);
         self.progress.tile_finished(counts);
+    }
+
+    fn tile_rendered(&self, tile: &TileView) {
+        self.progress.tile_rendered(tile);
     }
 
     fn canceled(&self) -> bool {

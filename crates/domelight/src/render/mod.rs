@@ -38,7 +38,7 @@ pub use output::Developed;
 #[cfg(feature = "io")]
 pub use provenance::{Provenance, kept_exposure};
 pub use renderer::Renderer;
-pub use tile::{Counts, Mark};
+pub use tile::{Counts, Mark, TileView};
 pub use tiling::{Tiling, Window};
 pub use variance::VarianceSums;
 pub use visibility::visibility;
@@ -183,6 +183,9 @@ pub trait Observer: Sync {
 
     /// Called when a tile of a pass is complete, which also ends the thread's last stage.
     fn tile_finished(&self, _counts: &Counts) {}
+
+    /// Called with the pixels of a tile when a pass of it is complete.
+    fn tile_rendered(&self, _tile: &TileView) {}
 
     /// Returns true to end the render: running tiles are finished, and others keep their samples.
     fn canceled(&self) -> bool {

@@ -265,6 +265,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
                 let counts = tile.render(context, strategy, &pass, scratch, observer);
                 tile.changed = *mark;
                 observer.tile_finished(&counts);
+                observer.tile_rendered(&tile.view());
                 true
             })
             .reduce(|| true, |a, b| a & b);

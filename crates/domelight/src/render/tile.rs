@@ -51,6 +51,24 @@ pub(super) struct Tile {
     pub(super) changed: Mark,
 }
 
+/// A tile of a running render, for those who watch it.
+#[derive(Clone, Copy, Debug)]
+pub struct TileView<'a>(&'a Tile);
+
+impl TileView<'_> {
+    /// The tile's pixels in the picture.
+    pub fn window(&self) -> Window {
+        self.0.window
+    }
+
+    /// The tile's layers so far. Its variance is estimated from the tile alone, unlike that of the whole picture.
+    pub fn layers(&self) -> Layers {
+        let mut layers = Layers::new(self.0.window.width, self.0.window.height);
+        self.0.put_into(&mut layers, self.0.window, &self.0.variance_sums());
+        layers
+    }
+}
+
 /// Counts of the work done, for statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
@@ -204,6 +222,11 @@ impl Tile {
         } else {
             layers.put(&self.pixels, self.window, window, variance);
         }
+    }
+
+    /// A view for observers.
+    pub(super) fn view(&self) -> TileView<'_> {
+        TileView(self)
     }
 
     /// The sums from which the variance of its pixels is estimated.
