@@ -318,6 +318,7 @@ fn flags_that_contradict_are_usage_errors() {
         2,
         &["--rays", "--strategy NAME:rays="],
     );
+    refused(&render(&folder, &["--display=127.0.0.1:9"]), 1, &["127.0.0.1:9", "tev"]);
     refused(&render(&folder, &["--size", "0x4"]), 2, &["0x4", "800x600"]);
     refused(&render(&folder, &["--material", "velvet"]), 2, &["velvet", "ggx:"]);
     refused(&render(&folder, &["-o", "picture.bmp"]), 2, &["picture.bmp", ".exr"]);
