@@ -1,6 +1,7 @@
 //! What was rendered, in words and numbers.
 
 use domelight::environment::{Environment, UpAxis};
+use domelight::math::{DVec3, Vec3};
 use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
 
@@ -82,8 +83,8 @@ impl EnvironmentReport {
 /// The view of a render; one of `fov` and `ortho` is null.
 #[derive(Clone, Debug, Serialize)]
 pub struct CameraReport {
-    origin: [f32; 3],
-    target: [f32; 3],
+    origin: Point,
+    target: Point,
     up: [f32; 3],
     fov: Option<f32>,
     ortho: Option<f32>,
@@ -92,14 +93,34 @@ pub struct CameraReport {
     dof: Option<DepthOfField>,
 }
 
+/// A point in the coordinates of the file.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[serde(untagged)]
+enum Point {
+    Near([f32; 3]),
+    /// Beyond single precision.
+    Far([f64; 3]),
+}
+
+impl Point {
+    fn new(point: Vec3, offset: DVec3) -> Self {
+        if offset == DVec3::ZERO {
+            Self::Near(point.to_array())
+        } else {
+            Self::Far((point.as_dvec3() + offset).to_array())
+        }
+    }
+}
+
 impl CameraReport {
-    /// The report of a camera, in the scene's own units, and of what its lens blurs.
-    pub fn new(view: &CameraSettings, dof: Option<DepthOfField>) -> Self {
+    /// The report of a camera in a scene with an offset ([`offset`](domelight::scene::SceneDescription::offset)), in the coordinates of its file,
+    /// and of what its lens blurs.
+    pub fn new(view: &CameraSettings, offset: DVec3, dof: Option<DepthOfField>) -> Self {
         let (fov, ortho) = match view.projection {
             Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),
             Projection::Orthographic { height } => (None, Some(height)),
         };
-        let [origin, target, up] = [view.origin, view.target, view.up].map(|v| v.to_array());
-        Self { origin, target, up, fov, ortho, dof }
+        let [origin, target] = [view.origin, view.target].map(|point| Point::new(point, offset));
+        Self { origin, target, up: view.up.to_array(), fov, ortho, dof }
     }
 }

@@ -30,7 +30,7 @@ pub struct LoadedScene {
     pub light: EnvironmentSettings,
     /// The map, lat-long.
     pub map: RgbImage,
-    /// The camera.
+    /// The camera, in the coordinates of the description.
     pub camera: CameraSettings,
     /// What the picture will lack of the files, one sentence per item.
     pub warnings: Vec<String>,
@@ -44,7 +44,7 @@ pub struct PreparedScene {
     pub scene: Scene,
     /// The view.
     pub camera: Camera,
-    /// The view, in the units of the scene's file, as `camera`.
+    /// The view, in the coordinates of the description, as `camera`.
     pub camera_settings: CameraSettings,
     /// The lens of a camera with depth of field.
     lens: Option<Lens>,
@@ -154,7 +154,7 @@ impl LoadedScene {
         let lens = dof.map(|(dof, focus)| dof.lens(&camera, focus)).transpose()?;
         let focused =
             |(dof, focus): (DepthOfField, f32)| DepthOfField { focus_distance: Some(focus), ..dof };
-        let camera_report = CameraReport::new(&camera, dof.map(focused));
+        let camera_report = CameraReport::new(&camera, description.offset, dof.map(focused));
         let (camera, camera_settings) = (Camera::new(&camera, width, height)?, camera);
         let camera = through(camera, lens);
         let n_triangles = description.built_triangle_count();

@@ -254,7 +254,7 @@ impl Job {
             ground: None,
             hide_env: settings.background == Background::Hidden,
             environment: EnvironmentReport::new(probe.clone(), &light, environment),
-            camera: CameraReport::new(camera_settings, None),
+            camera: CameraReport::new(camera_settings, scene.offset, None),
             size: [settings.width, settings.height],
         }
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use domelight::environment::io::ProbeOptions;
 use domelight::environment::UpAxis;
 use domelight::geometry::{Aabb, Mesh};
-use domelight::math::{Vec2, Vec3};
+use domelight::math::{DVec3, Vec2, Vec3};
 use domelight::picture::MAX_TEXELS;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
@@ -160,6 +160,8 @@ pub(crate) struct SceneData {
     camera: Option<CameraSettings>,
     cameras: Vec<NamedCamera>,
     subject: Aabb,
+    /// What all coordinates are relative to.
+    pub(crate) offset: DVec3,
     environment: Option<EnvironmentSettings>,
     up: UpAxis,
     /// Reflectance written in Python.
@@ -275,10 +277,12 @@ impl Scene {
             description.add_ground(up.vector());
         }
         let (camera, cameras) = (description.camera, description.cameras.clone());
+        let offset = description.offset;
         let environment = description.environment.clone();
         let built = parallel(py, move || scene::Scene::new(description))?;
         let scene = built.map_err(|error| bad_value(format!("{name}: {error}")))?;
-        let data = SceneData { scene, name, camera, cameras, subject, environment, up, lobes };
+        let data =
+            SceneData { scene, name, camera, cameras, subject, offset, environment, up, lobes };
         Ok(Self { inner: Arc::new(data) })
     }
 }
@@ -456,6 +460,13 @@ impl Scene {
             return Ok(None);
         }
         array(py, [min.to_array(), max.to_array()].concat(), &[2, 3]).map(Some)
+    }
+
+    /// tuple of float: the point of the file that `bounds` and cameras are relative to, for scenes at large coordinates such
+    /// as UTM; otherwise 0.
+    #[getter]
+    fn offset(&self) -> (f64, f64, f64) {
+        self.inner.offset.into()
     }
 
     /// str: the axis that points up, 'y' or 'z'.

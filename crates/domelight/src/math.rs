@@ -4,7 +4,7 @@
 
 pub(crate) mod functions;
 
-pub use glam::{Mat3, Mat4, Quat, Vec2, Vec3, Vec4, vec2, vec3};
+pub use glam::{DVec3, Mat3, Mat4, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 
 pub use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 

@@ -9,6 +9,7 @@ mod coverage;
 mod environment;
 mod examples;
 mod extraction;
+mod far_scenes;
 mod gltf;
 mod grid;
 mod ibl;

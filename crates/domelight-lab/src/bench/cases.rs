@@ -7,7 +7,7 @@ use std::str::FromStr as _;
 use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation};
-use domelight::math::{Vec3, vec3};
+use domelight::math::{DVec3, Vec3, vec3};
 use domelight::render::{Background, Filter, RenderSettings};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{CameraSettings, SceneDescription};
@@ -263,9 +263,9 @@ impl Case {
             light: light(&self.probe, settings.rotate, ROWS),
             view: View {
                 size: Text(Size { width: size[0], height: size[1] }),
-                origin: usual.then_some(Text(Triple(ORIGIN))),
-                target: usual.then_some(Text(Triple(Vec3::ZERO))),
-                up: usual.then_some(Text(Triple(Vec3::Y))),
+                origin: usual.then_some(Text(Triple(ORIGIN.as_dvec3()))),
+                target: usual.then_some(Text(Triple(DVec3::ZERO))),
+                up: usual.then_some(Text(Triple(DVec3::Y))),
                 fov: NotNegative::new(FOV).filter(|_| usual),
                 ..View::default()
             },

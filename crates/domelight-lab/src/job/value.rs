@@ -11,7 +11,7 @@ use clap::builder::{
 };
 use domelight::environment::UpAxis;
 use domelight::environment::mapping::Mapping;
-use domelight::math::{Vec3, vec3};
+use domelight::math::DVec3;
 use domelight::picture::tone::ToneCurve;
 use domelight::render::{Filter, Passes};
 use domelight::sampling::SamplerKind;
@@ -586,18 +586,18 @@ impl fmt::Display for Size {
     }
 }
 
-/// A point or a direction, `X,Y,Z`.
+/// A point or a direction, `X,Y,Z`, each finite in single precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Triple(pub Vec3);
+pub struct Triple(pub DVec3);
 
 impl FromStr for Triple {
     type Err = BadValue;
 
     fn from_str(text: &str) -> Result<Self, BadValue> {
-        let numbers: Result<Vec<f32>, _> = text.split(',').map(|x| x.trim().parse()).collect();
+        let numbers: Result<Vec<f64>, _> = text.split(',').map(|x| x.trim().parse()).collect();
         match numbers.as_deref() {
-            Ok(&[x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => {
-                Ok(Self(vec3(x, y, z)))
+            Ok(&[x, y, z]) if DVec3::new(x, y, z).as_vec3().is_finite() => {
+                Ok(Self(DVec3::new(x, y, z)))
             }
             _ => Err(BadValue::new(text, "three numbers such as 0,1.5,-4")),
         }
@@ -606,7 +606,7 @@ impl FromStr for Triple {
 
 impl fmt::Display for Triple {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Vec3 { x, y, z } = self.0;
+        let DVec3 { x, y, z } = self.0;
         write!(f, "{x},{y},{z}")
     }
 }
@@ -662,7 +662,7 @@ mod tests {
         assert_eq!("640x480".parse(), Ok(Size { width: 640, height: 480 }));
         let bad_sizes = ["", "640", "0x1", "1x65537", "ax3", "65536x65536"];
         assert!(bad_sizes.iter().all(|s| s.parse::<Size>().is_err()));
-        assert_eq!("1, -2,3e1".parse(), Ok(Triple(vec3(1.0, -2.0, 30.0))));
+        assert_eq!("1, -2,3e1".parse(), Ok(Triple(DVec3::new(1.0, -2.0, 30.0))));
         assert!(["1,2", "1,2,nan", "a,b,c"].iter().all(|s| s.parse::<Triple>().is_err()));
         assert_eq!("auto".parse(), Ok(Rotation::Auto));
         assert_eq!("-30".parse(), Ok(Rotation::Degrees(-30.0)));

@@ -29,7 +29,7 @@ pub struct View {
     #[arg(id = "view.from", long = "view", value_name = "VIEW|AZ,EL", allow_hyphen_values = true,
           conflicts_with_all = ["view.camera", "view.origin"])]
     pub from: Option<Text<ViewDirection>>,
-    /// Position of the camera [default: frames the scene]
+    /// Position of the camera, in the coordinates of the scene's file [default: frames the scene]
     #[arg(id = "view.origin", long = "origin", value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub origin: Option<Text<Triple>>,
     /// Point at which the camera looks
@@ -109,11 +109,11 @@ impl View {
         };
         let own = scene.camera.filter(|_| self.from.is_none());
         let camera = own.unwrap_or_else(framed);
-        let point = |triple: Option<Text<Triple>>| triple.map(|Text(Triple(point))| point);
+        let relative = |Text(Triple(point)): Text<Triple>| (point - scene.offset).as_vec3();
         CameraSettings {
-            origin: point(self.origin).unwrap_or(camera.origin),
-            target: point(self.target).unwrap_or(camera.target),
-            up: point(self.up).unwrap_or(camera.up),
+            origin: self.origin.map_or(camera.origin, relative),
+            target: self.target.map_or(camera.target, relative),
+            up: self.up.map_or(camera.up, |Text(Triple(up))| up.as_vec3()),
             projection: projection.unwrap_or(camera.projection),
         }
     }

@@ -2,16 +2,18 @@
 
 use std::path::PathBuf;
 
+use glam::DMat4;
 use rayon::prelude::*;
 
 use super::camera::CameraSettings;
 use super::framing::ViewDirection;
 use super::material::Material;
+use super::offset;
 use super::texture::Texture;
 use crate::RgbImage;
 use crate::environment::{Environment, EnvironmentError, Orientation, UpAxis};
 use crate::geometry::{Aabb, Mesh, conjugated};
-use crate::math::{Mat4, functions};
+use crate::math::{DVec3, Mat4, functions};
 
 /// The description of a scene, from a loader or a built-in scene. [`Scene::new`](super::Scene::new) checks it.
 #[derive(Clone, Debug, Default)]
@@ -39,6 +41,10 @@ pub struct SceneDescription {
     ///
     /// The geometry is as in the file; rotating it is up to the caller.
     pub up: Option<UpAxis>,
+    /// The point of the file that is the description's origin: meshes, instances and cameras are relative to it. It is
+    /// zero unless a loader found the scene far from the origin beside its extent, as in UTM or ECEF coordinates,
+    /// where single precision is too coarse.
+    pub offset: DVec3,
 }
 
 /// A mesh and its material.
@@ -192,8 +198,57 @@ impl SceneDescription {
         }
     }
 
-    /// Transforms the parts and the camera by an affine matrix.
+    /// Transforms the parts and the cameras by an affine matrix, which is in the coordinates of the file
+    /// ([`SceneDescription::offset`]).
     pub fn transform(&mut self, m: &Mat4) {
+        if self.offset == DVec3::ZERO {
+            self.transform_relative(m);
+        } else {
+            self.place(m, m.w_axis.truncate().as_dvec3());
+        }
+    }
+
+    /// Transforms the scene by the linear part of an affine matrix and a translation, and describes it relative to a
+    /// point nearby if it is far away then.
+    pub(super) fn place(&mut self, linear: &Mat4, translation: DVec3) {
+        let matrix = DMat4 { w_axis: translation.extend(1.0), ..linear.as_dmat4() };
+        let corners = self.corners_in_file().map(|corner| matrix.transform_point3(corner));
+        let offset = offset::of_points(corners);
+        // The description's origin goes to the image of the offset.
+        let origin = if self.offset == DVec3::ZERO {
+            translation
+        } else {
+            matrix.transform_point3(self.offset)
+        };
+        let relative = DMat4::from_translation(origin - offset).as_mat4();
+        self.offset = offset;
+        self.transform_relative(&Mat4 { w_axis: relative.w_axis, ..*linear });
+    }
+
+    /// Describes the scene in the coordinates of the file, if it is not far away as a whole.
+    #[cfg(feature = "io")]
+    pub(super) fn return_if_near(&mut self) {
+        if offset::of_points(self.corners_in_file()) == DVec3::ZERO {
+            self.set_offset(DVec3::ZERO);
+        }
+    }
+
+    /// The corners of the bounding box in the coordinates of the file.
+    fn corners_in_file(&self) -> [DVec3; 8] {
+        self.bounds().corners().map(|corner| corner.as_dvec3() + self.offset)
+    }
+
+    /// Describes the scene relative to another point of the file.
+    fn set_offset(&mut self, offset: DVec3) {
+        let shift = self.offset - offset;
+        if shift != DVec3::ZERO {
+            self.transform_relative(&Mat4::from_translation(shift.as_vec3()));
+            self.offset = offset;
+        }
+    }
+
+    /// Transforms everything by an affine matrix in the description's own coordinates.
+    fn transform_relative(&mut self, m: &Mat4) {
         for part in &mut self.parts {
             part.mesh.transform(m);
         }
@@ -206,8 +261,13 @@ impl SceneDescription {
         }
     }
 
-    /// Appends another scene's parts, and its camera and environment if this scene has none.
+    /// Appends another scene's parts, and its camera and environment if this scene has none. An empty scene takes over
+    /// the other's [`SceneDescription::offset`].
     pub fn append(&mut self, mut other: Self) {
+        if self.parts.is_empty() {
+            self.set_offset(other.offset);
+        }
+        other.set_offset(self.offset);
         let (materials, textures) = (self.materials.len(), self.textures.len());
         self.scenery.extend(other.scenery.iter().map(|part| part + self.parts.len()));
         for part in &mut other.parts {

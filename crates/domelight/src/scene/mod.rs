@@ -17,6 +17,7 @@ mod layers;
 #[cfg(feature = "io")]
 pub mod load;
 pub(crate) mod material;
+mod offset;
 mod shading;
 mod subject;
 mod texture;

@@ -8,7 +8,7 @@ use super::{
 use crate::Rgb;
 use crate::bsdf::Bsdf;
 use crate::geometry::{Aabb, Mesh, power_of_two};
-use crate::math::{Frame, Mat4, Vec3};
+use crate::math::{DVec3, Frame, Mat4, Vec3};
 
 /// The range of scenes that are traced unscaled: the minimum size, and the maximum coordinate.
 const USUAL: [f32; 2] = [1.0 / 16.0, 65536.0];
@@ -58,6 +58,7 @@ impl SceneDescription {
             self.parts.iter_mut().for_each(|part| part.mesh.scale(factor));
             let translations = self.instances.iter_mut().map(|i| &mut i.transform.w_axis);
             translations.for_each(|t| *t = (factor * t.truncate()).extend(t.w));
+            self.offset *= f64::from(factor);
             self.camera.iter_mut().chain([view]).for_each(|camera| camera.scale(factor));
         }
         factor
@@ -68,6 +69,7 @@ impl SceneDescription {
     pub fn normalize(&mut self) {
         let bounds = self.subject_bounds();
         if !bounds.is_empty() {
+            self.offset = DVec3::ZERO;
             self.transform(&Mesh::normalization(&bounds));
         }
     }

@@ -51,6 +51,7 @@ pub use wavefront::ObjErrorKind;
 use super::{Material, Part, SceneDescription};
 use crate::Rgb;
 use crate::geometry::Mesh;
+use crate::math::DVec3;
 use crate::memory::OverLimit;
 use budget::Budget;
 use files::Files;
@@ -337,8 +338,22 @@ pub fn load_bytes(
 
 fn finish(mut loaded: Loaded, path: &Path, budget: &Budget) -> Loaded {
     loaded.warnings.extend(budget.warning(path));
+    loaded.warnings.extend(far_away(path, &loaded.description));
     once(&mut loaded.warnings);
     Loaded { memory: budget.taken(), files: budget.files(), ..loaded }
+}
+
+/// What is said of a scene that is described relative to a point far from the origin.
+fn far_away(path: &Path, description: &SceneDescription) -> Option<String> {
+    let DVec3 { x, y, z } = description.offset;
+    if description.offset == DVec3::ZERO {
+        return None;
+    }
+    let size = description.bounds().size().max_element();
+    Some(format!(
+        "{}: a scene {size} across at large coordinates is drawn relative to {x},{y},{z}, to keep its precision",
+        path.display()
+    ))
 }
 
 /// Leaves each warning once, and no more than anybody reads.

@@ -23,7 +23,8 @@ use super::wavefront::{ObjErrorKind, enough, lines, number, numbers, unquoted, w
 use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, mtl, non_finite, part_name, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::scene::offset;
 use crate::scene::{Material, Part, SceneDescription};
 
 /// Memory of a mesh for each byte of its text: a corner of a face is some 3 to 10 bytes, and takes 20 while it is read and
@@ -38,6 +39,7 @@ pub(super) fn load(
 ) -> Result<Loaded, LoadError> {
     budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
     let mut reader = Reader::new(path, budget, strict);
+    reader.offset = offset::of_points(lines(bytes).filter_map(|(_, line)| vertex_of(&line)));
     for (number, line) in lines(bytes) {
         reader.line(number, &line)?;
     }
@@ -82,6 +84,8 @@ struct Reader<'a> {
     /// Whether positions that are not finite and files that cannot be read are errors.
     strict: bool,
     positions: Vec<Vec3>,
+    /// What the positions are relative to.
+    offset: DVec3,
     /// One a position as the file has it, none where it gives none; empty if it never does.
     colors: Vec<Option<Rgb>>,
     uvs: Vec<Vec2>,
@@ -114,6 +118,7 @@ impl<'a> Reader<'a> {
             path,
             strict,
             positions: Vec::new(),
+            offset: DVec3::ZERO,
             colors: Vec::new(),
             uvs: Vec::new(),
             normals: Vec::new(),
@@ -142,7 +147,10 @@ impl<'a> Reader<'a> {
         match keyword {
             "v" => {
                 let read = if self.strict { numbers } else { any_numbers };
-                self.vertex(&read(keyword, rest, 3).map_err(at)?);
+                let numbers = read(keyword, rest, 3).map_err(at)?;
+                let position = Vec3::from_slice(&numbers);
+                self.positions.push(self.relative(position, text));
+                self.vertex_color(&numbers);
             }
             "vt" => {
                 let n = numbers_or_zero(keyword, rest, 1).map_err(at)?;
@@ -177,13 +185,21 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// A position, perhaps with a weight (which rendering ignores) or a color after it.
-    fn vertex(&mut self, n: &[f32]) {
+    /// A position relative to the offset, of the line that it is from.
+    fn relative(&self, position: Vec3, line: &str) -> Vec3 {
+        if self.offset == DVec3::ZERO {
+            return position;
+        }
+        let precise = vertex_of(line).unwrap_or_else(|| position.as_dvec3());
+        (precise - self.offset).as_vec3()
+    }
+
+    /// The color of the last position, perhaps after a weight, which rendering ignores.
+    fn vertex_color(&mut self, n: &[f32]) {
         if n.len() >= 6 {
-            self.colors.resize(self.positions.len(), None);
+            self.colors.resize(self.positions.len() - 1, None);
             self.colors.push(Some(Rgb::new(n[n.len() - 3], n[n.len() - 2], n[n.len() - 1])));
         }
-        self.positions.push(Vec3::new(n[0], n[1], n[2]));
     }
 
     /// A corner of a face. Without `strict`, texture coordinates and normals that do not exist are left out.
@@ -304,6 +320,7 @@ impl<'a> Reader<'a> {
             parts,
             materials: self.materials,
             textures: self.textures.loaded,
+            offset: self.offset,
             ..SceneDescription::default()
         };
         self.warnings.extend(self.notes.sentences());
@@ -390,6 +407,14 @@ impl<'a> Reader<'a> {
         }
         mesh
     }
+}
+
+/// The position of a line that defines a vertex.
+fn vertex_of(line: &str) -> Option<DVec3> {
+    let mut words = words(line);
+    let is_vertex = words.next() == Some("v");
+    let mut number = || words.next()?.parse().ok();
+    if is_vertex { Some(DVec3::new(number()?, number()?, number()?)) } else { None }
 }
 
 /// The group that `s` names: none for `off`, `null` and 0. Words that are no numbers, such as `on`, name one group.

@@ -16,7 +16,8 @@ use super::faces::{Polygons, color_triangles};
 use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, line_end, non_finite};
 use crate::Rgb;
 use crate::geometry::Mesh;
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec3, Vec2};
+use crate::scene::offset;
 
 /// An error in an OFF file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -82,8 +83,9 @@ pub(super) fn load(
 ) -> Result<Loaded, LoadError> {
     budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
     let error = |(line, kind)| LoadError::Off { path: path.into(), line, kind };
-    let Read { mesh, non_finite_colors } = read(bytes, strict).map_err(error)?;
+    let Read { mesh, offset, non_finite_colors } = read(bytes, strict).map_err(error)?;
     let mut loaded = Loaded::of_mesh(path, mesh);
+    loaded.description.offset = offset;
     loaded.warnings.extend(colors::warning(path, non_finite_colors));
     Ok(loaded)
 }
@@ -134,6 +136,7 @@ impl Kind {
 type Lines<'a> = std::iter::Enumerate<std::slice::Split<'a, u8, fn(&u8) -> bool>>;
 
 /// A file's words, line by line, without comments.
+#[derive(Clone)]
 struct Words<'a> {
     lines: Lines<'a>,
     /// The line, from 1.
@@ -170,15 +173,21 @@ impl<'a> Words<'a> {
     }
 
     fn number(&mut self, ended: &impl Fn() -> OffErrorKind) -> Located<f32> {
-        let word = self.next().ok_or_else(|| (self.line, ended()))?;
-        match non_finite::parse(word) {
-            Some(value) if !self.strict => Ok(value),
-            _ => number(word).map_err(|kind| (self.line, kind)),
-        }
+        Ok(self.precise_number(ended)? as f32)
     }
 
-    fn vector(&mut self, ended: &impl Fn() -> OffErrorKind) -> Located<Vec3> {
-        Ok(Vec3::new(self.number(ended)?, self.number(ended)?, self.number(ended)?))
+    fn precise_number(&mut self, ended: &impl Fn() -> OffErrorKind) -> Located<f64> {
+        let word = self.next().ok_or_else(|| (self.line, ended()))?;
+        let value = match non_finite::parse(word) {
+            Some(value) if !self.strict => value,
+            _ => number(word).map_err(|kind| (self.line, kind))?,
+        };
+        Ok(word.parse().unwrap_or_else(|_| value.into()))
+    }
+
+    fn vector(&mut self, ended: &impl Fn() -> OffErrorKind) -> Located<DVec3> {
+        let mut number = || self.precise_number(ended);
+        Ok(DVec3::new(number()?, number()?, number()?))
     }
 
     /// The words that are left of a line, none where lines mean nothing.
@@ -195,6 +204,8 @@ fn number(word: &str) -> Result<f32, OffErrorKind> {
 /// What a file holds.
 struct Read {
     mesh: Mesh,
+    /// What the positions are relative to.
+    offset: DVec3,
     /// How many colors are NaN or infinite.
     non_finite_colors: usize,
 }
@@ -204,11 +215,18 @@ fn read(bytes: &[u8], strict: bool) -> Located<Read> {
     let end = line_end(bytes);
     let lines = bytes.split(|&b| b == end).count();
     let (kind, vertices, faces) = header(&mut words, lines)?;
+    let offset = offset_of(words.clone(), kind, vertices);
     let mut mesh = Mesh::default();
     let mut vertex_colors = Colors::default();
     for found in 0..vertices {
         let ended = || OffErrorKind::EndOfFile { what: "vertices", found, promised: vertices };
-        read_vertex(&mut words, kind, &mut mesh, &mut vertex_colors, &ended)?;
+        let position = read_vertex(&mut words, kind, &mut mesh, &mut vertex_colors, &ended)?;
+        let position = (position - offset).as_vec3();
+        if strict && !position.is_finite() {
+            let text = position.to_string();
+            return Err((words.line, OffErrorKind::NotANumber { text }));
+        }
+        mesh.positions.push(position);
     }
     let mut polygons = Polygons::default();
     let mut face_colors = Colors::default();
@@ -235,7 +253,7 @@ fn read(bytes: &[u8], strict: bool) -> Located<Read> {
         mesh = color_triangles(&mesh, triangles.iter().map(of));
         non_finite_colors = non_finite;
     }
-    Ok(Read { mesh, non_finite_colors })
+    Ok(Read { mesh, offset, non_finite_colors })
 }
 
 /// The kind, and how many vertices and faces are promised, in a file of so many lines.
@@ -273,24 +291,30 @@ fn header(words: &mut Words, lines: usize) -> Located<(Kind, usize, usize)> {
     Ok((kind, vertices, faces))
 }
 
+/// What positions are to be relative to. Vertices that cannot be read are reported when they are read again.
+fn offset_of(mut words: Words, kind: Kind, vertices: usize) -> DVec3 {
+    let ended = || OffErrorKind::EndOfFile { what: "vertices", found: 0, promised: vertices };
+    offset::of_points((0..vertices).map_while(|_| {
+        let (mut mesh, mut colors) = (Mesh::default(), Colors::default());
+        read_vertex(&mut words, kind, &mut mesh, &mut colors, &ended).ok()
+    }))
+}
+
+/// Reads what comes with a vertex, and returns its position.
 fn read_vertex(
     words: &mut Words,
     kind: Kind,
     mesh: &mut Mesh,
     colors: &mut Colors,
     ended: &impl Fn() -> OffErrorKind,
-) -> Located<()> {
+) -> Located<DVec3> {
     let mut position = words.vector(ended)?;
     if kind.coordinates == Coordinates::Homogeneous {
-        let w = words.number(ended)?;
+        let w = words.precise_number(ended)?;
         position /= if w == 0.0 { 1.0 } else { w };
     }
-    if words.strict && !position.is_finite() {
-        return Err((words.line, OffErrorKind::NotANumber { text: position.to_string() }));
-    }
-    mesh.positions.push(position);
     if kind.normals {
-        mesh.normals.push(words.vector(ended)?.normalize_or_zero());
+        mesh.normals.push(words.vector(ended)?.as_vec3().normalize_or_zero());
     }
     if kind.colors {
         let uvs = 2 * usize::from(kind.uvs);
@@ -308,7 +332,7 @@ fn read_vertex(
     }
     // What the header word does not name.
     let _ = words.rest_of_line();
-    Ok(())
+    Ok(position)
 }
 
 fn read_face(

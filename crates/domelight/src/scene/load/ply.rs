@@ -15,7 +15,8 @@ use super::faces::{Polygons, color_triangles};
 use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, line_end, non_finite};
 use crate::Rgb;
 use crate::geometry::Mesh;
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::scene::offset;
 use crate::scene::texture::{Encoding, decode};
 
 /// A position in a PLY file.
@@ -125,9 +126,10 @@ pub(super) fn load(
     let header = Header::parse(bytes).map_err(error)?;
     header.check_size(bytes.len() - header.length).map_err(error)?;
     budget.take(&path.display().to_string(), header.memory(bytes.len() - header.length))?;
-    let Parsed { body: Body { mesh, non_finite_colors }, rest } =
+    let Parsed { body: Body { mesh, offset, non_finite_colors }, rest } =
         parse(&header, bytes, strict).map_err(error)?;
     let mut loaded = Loaded::of_mesh(path, mesh);
+    loaded.description.offset = offset;
     loaded.warnings.extend(colors::warning(path, non_finite_colors));
     if header.format == Format::Ascii && !rest.trim_ascii().is_empty() {
         loaded.warnings.push(format!(
@@ -141,6 +143,8 @@ pub(super) fn load(
 /// What the rows hold.
 struct Body {
     mesh: Mesh,
+    /// What the positions are relative to.
+    offset: DVec3,
     /// How many colors are NaN or infinite.
     non_finite_colors: usize,
 }
@@ -363,10 +367,11 @@ impl Header {
 }
 
 /// The numbers of the body in order.
-trait Numbers {
+trait Numbers: Clone {
     fn next(&mut self, scalar: Scalar) -> Located<f64>;
 }
 
+#[derive(Clone)]
 struct Ascii<'a> {
     data: &'a [u8],
     position: usize,
@@ -396,6 +401,7 @@ impl Numbers for Ascii<'_> {
     }
 }
 
+#[derive(Clone)]
 struct Binary<'a, const BIG: bool> {
     data: &'a [u8],
     position: usize,
@@ -435,6 +441,7 @@ impl<const BIG: bool> Numbers for Binary<'_, BIG> {
 
 fn read_body(header: &Header, numbers: &mut impl Numbers, strict: bool) -> Located<Body> {
     let mut mesh = Mesh::default();
+    let mut offset = None;
     let mut non_finite_colors = 0;
     let mut faces = Faces::default();
     let (mut has_vertices, mut has_faces) = (false, false);
@@ -443,7 +450,9 @@ fn read_body(header: &Header, numbers: &mut impl Numbers, strict: bool) -> Locat
         match element.name.as_str() {
             "vertex" => {
                 has_vertices = true;
-                non_finite_colors += read_vertices(element, numbers, &mut mesh, strict)?;
+                let rows = VertexRows::new(element)?;
+                let offset = *offset.get_or_insert_with(|| rows.offset(numbers.clone()));
+                non_finite_colors += rows.read(numbers, offset, &mut mesh, strict)?;
             }
             "face" => {
                 has_faces = true;
@@ -466,7 +475,8 @@ fn read_body(header: &Header, numbers: &mut impl Numbers, strict: bool) -> Locat
             PlyErrorKind::Missing { what: "element face; points alone cannot be rendered" },
         ));
     }
-    Ok(Body { mesh: faces.finish(mesh), non_finite_colors })
+    let offset = offset.unwrap_or_default();
+    Ok(Body { mesh: faces.finish(mesh), offset, non_finite_colors })
 }
 
 /// What is read of a vertex, each with its names; the number is the slot in a row of values.
@@ -516,46 +526,73 @@ impl Colors {
     }
 }
 
-/// Reads positions and what comes with them, and returns how many colors are not finite.
-fn read_vertices(
-    element: &Element,
-    numbers: &mut impl Numbers,
-    mesh: &mut Mesh,
-    strict: bool,
-) -> Located<usize> {
-    let slots: Vec<Option<usize>> = element.properties.iter().map(slot_of).collect();
-    let has = |wanted: std::ops::Range<usize>| wanted.into_iter().all(|s| slots.contains(&Some(s)));
-    let place = PlyPlace::Line(element.line);
-    if !has(0..3) {
-        return Err((place, PlyErrorKind::Missing { what: "vertex properties x, y and z" }));
-    }
-    let (normals, uvs, colors) = (has(3..6), has(6..8), Colors::of(element));
+/// The rows of the element `vertex`.
+struct VertexRows<'a> {
+    element: &'a Element,
+    /// The slot of each property that is read.
+    slots: Vec<Option<usize>>,
+}
 
-    mesh.positions.reserve(element.count as usize);
-    for row in 0..element.count as usize {
-        let mut values = [0f32; SLOTS.len()];
-        for (property, slot) in element.properties.iter().zip(&slots) {
+impl<'a> VertexRows<'a> {
+    fn new(element: &'a Element) -> Located<Self> {
+        let rows = Self { element, slots: element.properties.iter().map(slot_of).collect() };
+        let missing = PlyErrorKind::Missing { what: "vertex properties x, y and z" };
+        if rows.has(0..3) { Ok(rows) } else { Err((PlyPlace::Line(element.line), missing)) }
+    }
+
+    fn has(&self, mut wanted: std::ops::Range<usize>) -> bool {
+        wanted.all(|slot| self.slots.contains(&Some(slot)))
+    }
+
+    /// The values of the next row.
+    fn row(&self, numbers: &mut impl Numbers) -> Located<[f64; SLOTS.len()]> {
+        let mut values = [0.0; SLOTS.len()];
+        for (property, slot) in self.element.properties.iter().zip(&self.slots) {
             match (property.list, slot) {
-                (None, Some(slot)) => values[*slot] = numbers.next(property.scalar)? as f32,
+                (None, Some(slot)) => values[*slot] = numbers.next(property.scalar)?,
                 _ => skip_property(property, numbers)?,
             }
         }
-        let [x, y, z, nx, ny, nz, u, v, r, g, b] = values;
-        let position = Vec3::new(x, y, z);
-        if strict && !position.is_finite() {
-            let place = PlyPlace::Row { element: element.name.clone(), row };
-            return Err((place, PlyErrorKind::NotFinite { position }));
-        }
-        mesh.positions.push(position);
-        if normals {
-            mesh.normals.push(Vec3::new(nx, ny, nz).normalize_or_zero());
-        }
-        if uvs {
-            mesh.uvs.push(Vec2::new(u, 1.0 - v));
-        }
-        mesh.colors.extend(colors.map(|_| Rgb::new(r, g, b)));
+        Ok(values)
     }
-    Ok(colors.map_or(0, |colors| colors.linearize(&mut mesh.colors)))
+
+    /// What positions are to be relative to. Rows that cannot be read are reported by [`Self::read`].
+    fn offset(&self, mut numbers: impl Numbers) -> DVec3 {
+        let rows = (0..self.element.count).map_while(|_| self.row(&mut numbers).ok());
+        offset::of_points(rows.map(|[x, y, z, ..]| DVec3::new(x, y, z)))
+    }
+
+    /// Reads positions and what comes with them, and returns how many colors are not finite.
+    fn read(
+        &self,
+        numbers: &mut impl Numbers,
+        offset: DVec3,
+        mesh: &mut Mesh,
+        strict: bool,
+    ) -> Located<usize> {
+        let Self { element, .. } = self;
+        let (normals, uvs, colors) = (self.has(3..6), self.has(6..8), Colors::of(element));
+        mesh.positions.reserve(element.count as usize);
+        for row in 0..element.count as usize {
+            let values = self.row(numbers)?;
+            let [x, y, z, ..] = values;
+            let position = (DVec3::new(x, y, z) - offset).as_vec3();
+            if strict && !position.is_finite() {
+                let place = PlyPlace::Row { element: element.name.clone(), row };
+                return Err((place, PlyErrorKind::NotFinite { position }));
+            }
+            mesh.positions.push(position);
+            let [_, _, _, nx, ny, nz, u, v, r, g, b] = values.map(|value| value as f32);
+            if normals {
+                mesh.normals.push(Vec3::new(nx, ny, nz).normalize_or_zero());
+            }
+            if uvs {
+                mesh.uvs.push(Vec2::new(u, 1.0 - v));
+            }
+            mesh.colors.extend(colors.map(|_| Rgb::new(r, g, b)));
+        }
+        Ok(colors.map_or(0, |colors| colors.linearize(&mut mesh.colors)))
+    }
 }
 
 /// What the triangles are made of.

@@ -15,8 +15,8 @@ use std::path::Path;
 
 use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, non_finite, stem, text_of};
 use crate::geometry::Mesh;
-use crate::math::Vec3;
-use crate::scene::{Material, Part, SceneDescription};
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Material, Part, SceneDescription, offset};
 
 /// An error in an STL file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -93,7 +93,7 @@ pub(super) fn load(
     let error = |kind| LoadError::Stl { path: path.into(), kind };
     let name = path.display().to_string();
     let mut warnings = Vec::new();
-    let parts = if let Some(facets) = facets(bytes) {
+    let (parts, offset) = if let Some(facets) = facets(bytes) {
         budget.take(&name, facets as u64 * (3 * 12 + 12))?;
         let (counted, rest) = bytes[HEADER..].split_at(facets * FACET);
         if !rest.is_empty() && rest.len().is_multiple_of(FACET) {
@@ -102,16 +102,18 @@ pub(super) fn load(
                 rest.len() / FACET
             ));
         }
-        vec![(stem(path), binary(counted, strict).map_err(error)?)]
+        let offset = offset::of_points(facet_vertices(counted));
+        (vec![(stem(path), binary(counted, offset, strict).map_err(error)?)], offset)
     } else if is_text(bytes) {
         budget.take(&name, MEMORY_PER_BYTE * bytes.len() as u64)?;
-        let Solids { parts, unended } = ascii(path, bytes, strict).map_err(error)?;
+        let offset = offset::of_points(text_vertices(bytes));
+        let Solids { parts, unended } = ascii(path, bytes, offset, strict).map_err(error)?;
         warnings.extend(unended.map(|line| {
             format!(
                 "{name}, line {line}: the text ends here without 'endsolid'; the file may be truncated"
             )
         }));
-        parts
+        (parts, offset)
     } else {
         let count = bytes.get(80..HEADER).and_then(|b| b.try_into().ok());
         let facets = count.map_or(0, u32::from_le_bytes);
@@ -122,6 +124,7 @@ pub(super) fn load(
     let description = SceneDescription {
         parts: parts.map(|(name, mesh)| Part { name, mesh, material: 0 }).collect(),
         materials: vec![Material::diffuse("default", DEFAULT_ALBEDO)],
+        offset,
         ..SceneDescription::default()
     };
     Ok(Loaded { description, warnings, ..Loaded::default() })
@@ -152,20 +155,36 @@ fn facets(bytes: &[u8]) -> Option<usize> {
     fits.then_some(count)
 }
 
-fn binary(bytes: &[u8], strict: bool) -> Result<Mesh, StlErrorKind> {
+fn binary(bytes: &[u8], offset: DVec3, strict: bool) -> Result<Mesh, StlErrorKind> {
     let mut mesh = Mesh::default();
-    for (facet, bytes) in bytes.as_chunks::<FACET>().0.iter().enumerate() {
-        let number = |i: usize| f32::from_le_bytes([0, 1, 2, 3].map(|k| bytes[4 * i + k]));
-        for i in [3, 6, 9] {
-            let position = Vec3::new(number(i), number(i + 1), number(i + 2));
-            if strict && !position.is_finite() {
-                return Err(StlErrorKind::NotFinite { facet, position });
-            }
-            mesh.positions.push(position);
+    for (i, position) in facet_vertices(bytes).enumerate() {
+        let position = (position - offset).as_vec3();
+        if strict && !position.is_finite() {
+            return Err(StlErrorKind::NotFinite { facet: i / 3, position });
         }
-        add_facet(&mut mesh);
+        mesh.positions.push(position);
+        if i % 3 == 2 {
+            add_facet(&mut mesh);
+        }
     }
     Ok(mesh)
+}
+
+/// The vertices of binary facets, three each.
+fn facet_vertices(bytes: &[u8]) -> impl Iterator<Item = DVec3> {
+    bytes.as_chunks::<FACET>().0.iter().flat_map(|bytes| {
+        let number = |i: usize| f32::from_le_bytes([0, 1, 2, 3].map(|k| bytes[4 * i + k])).into();
+        [3, 6, 9].map(|i| DVec3::new(number(i), number(i + 1), number(i + 2)))
+    })
+}
+
+/// The vertices of a text.
+fn text_vertices(bytes: &[u8]) -> impl Iterator<Item = DVec3> {
+    bytes.split(|&b| b == b'\n' || b == b'\r').filter_map(|line| {
+        let text = text_of(line);
+        let (keyword, rest) = text.trim().split_once(char::is_whitespace)?;
+        if keyword.eq_ignore_ascii_case("vertex") { precise_vertex(rest) } else { None }
+    })
 }
 
 /// The solids of a text.
@@ -175,7 +194,7 @@ struct Solids {
     unended: Option<usize>,
 }
 
-fn ascii(path: &Path, bytes: &[u8], strict: bool) -> Result<Solids, StlErrorKind> {
+fn ascii(path: &Path, bytes: &[u8], offset: DVec3, strict: bool) -> Result<Solids, StlErrorKind> {
     let mut solids: Vec<(String, Mesh)> = Vec::new();
     let mut corners = 0;
     let mut unended = None;
@@ -198,7 +217,8 @@ fn ascii(path: &Path, bytes: &[u8], strict: bool) -> Result<Solids, StlErrorKind
             unended = None;
         } else if keyword.eq_ignore_ascii_case("vertex") {
             let Some((_, mesh)) = solids.last_mut() else { continue };
-            mesh.positions.push(vertex(rest, strict).ok_or_else(|| StlErrorKind::Vertex {
+            let read = || vertex(rest, offset).filter(|position| position.is_finite() || !strict);
+            mesh.positions.push(read().ok_or_else(|| StlErrorKind::Vertex {
                 line,
                 text: text.chars().take(60).collect(),
             })?);
@@ -223,10 +243,22 @@ fn ascii(path: &Path, bytes: &[u8], strict: bool) -> Result<Solids, StlErrorKind
     }
 }
 
-fn vertex(text: &str, strict: bool) -> Option<Vec3> {
+/// A position relative to the offset.
+fn vertex(text: &str, offset: DVec3) -> Option<Vec3> {
     let mut numbers = text.split_whitespace().map(non_finite::parse);
     let position = Vec3::new(numbers.next()??, numbers.next()??, numbers.next()??);
-    (position.is_finite() || !strict).then_some(position)
+    if offset == DVec3::ZERO {
+        return Some(position);
+    }
+    let precise = precise_vertex(text).unwrap_or_else(|| position.as_dvec3());
+    Some((precise - offset).as_vec3())
+}
+
+/// A position in double precision, if it is written as usual.
+fn precise_vertex(text: &str) -> Option<DVec3> {
+    let mut numbers = text.split_whitespace().map(str::parse);
+    let mut number = || numbers.next()?.ok();
+    Some(DVec3::new(number()?, number()?, number()?))
 }
 
 /// The last three vertices as a triangle.

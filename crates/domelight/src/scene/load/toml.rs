@@ -54,6 +54,7 @@ use std::fmt;
 use std::ops::Range;
 use std::path::Path;
 
+use glam::DMat4;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -65,13 +66,14 @@ use super::{
 };
 use crate::Rgb;
 use crate::bsdf::{Bsdf, ParseMaterialError};
-use crate::geometry::{Similarity, conjugated, linear_part};
-use crate::math::{Mat4, Vec2, Vec3, Vec4, rotation_x, rotation_y, rotation_z};
+use crate::geometry::{Similarity, linear_part};
+use crate::math::{DVec3, Mat4, Vec2, Vec3, Vec4, rotation_x, rotation_y, rotation_z};
 use crate::scene::builtin::{BuiltinScene, UnknownScene};
 use crate::scene::camera::{CameraError, CameraSettings, Projection};
 use crate::scene::{
     Coverage, Emission, EnvironmentSettings, EnvironmentSource, Instance, Material, MaterialModel,
     MetallicRoughnessMaterial, NormalMap, SceneDescription, TextureRef, UpAxis, UvTransform, Wrap,
+    offset,
 };
 
 /// An error in a scene file.
@@ -164,8 +166,8 @@ struct SceneFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CameraTable {
-    origin: [f32; 3],
-    target: [f32; 3],
+    origin: [f64; 3],
+    target: [f64; 3],
     up: Option<[f32; 3]>,
     fov: Option<f32>,
     orthographic: Option<f32>,
@@ -251,8 +253,8 @@ struct ObjectTable {
     material: Option<String>,
     scale: Option<Scale>,
     rotate: Option<[f32; 3]>,
-    translate: Option<[f32; 3]>,
-    matrix: Option<[[f32; 4]; 4]>,
+    translate: Option<[f64; 3]>,
+    matrix: Option<[[f64; 4]; 4]>,
 }
 
 impl ObjectTable {
@@ -305,6 +307,7 @@ pub(super) fn load(
         budget,
         options,
         loaded: Loaded::default(),
+        may_be_far: false,
     };
     reader.scene(file)?;
     Ok(reader.finish())
@@ -344,6 +347,9 @@ impl Lines {
     }
 }
 
+/// The translation up to which single precision places objects finely, at any usual size.
+const FINE: f64 = 65536.0;
+
 /// What makes objects copies of each other: file, built-in scene, material.
 type ObjectKey = [Option<String>; 3];
 
@@ -351,7 +357,7 @@ type ObjectKey = [Option<String>; 3];
 struct SharedObject {
     parts: Range<usize>,
     instances: Range<usize>,
-    matrix: Mat4,
+    placement: Placement,
 }
 
 struct Reader<'a> {
@@ -368,6 +374,8 @@ struct Reader<'a> {
     budget: &'a Budget<'a>,
     options: &'a LoadOptions,
     loaded: Loaded,
+    /// Whether the objects' places leave open that the scene is far from the origin beside its extent.
+    may_be_far: bool,
 }
 
 impl Reader<'_> {
@@ -386,12 +394,6 @@ impl Reader<'_> {
         }
         // The materials of [materials] come first, and with them the only textures so far.
         self.loaded.description.textures = std::mem::take(&mut self.textures.loaded);
-        if let Some(camera) = file.camera {
-            let at = camera.span().start;
-            let settings = camera_settings(&camera.into_inner(), file.up)
-                .map_err(|kind| self.error(at, kind))?;
-            self.loaded.description.camera = Some(settings);
-        }
         if let Some(environment) = file.environment {
             let at = environment.span().start;
             let settings = self.environment(environment.into_inner(), at)?;
@@ -400,9 +402,23 @@ impl Reader<'_> {
         for object in &file.objects {
             *self.n_objects.entry(object.get_ref().key()).or_default() += 1;
         }
+        let places = file.objects.iter().filter_map(|object| Placement::new(object.get_ref()).ok());
+        let places: Vec<DVec3> = places.map(|placement| placement.translation).collect();
+        let is_one = places.iter().all(|place| *place == places[0]);
+        let is_coarse = places.iter().any(|place| place.abs().max_element() > FINE);
+        self.may_be_far = is_one || is_coarse || offset::of_points(places) != DVec3::ZERO;
         for object in file.objects {
             let at = object.span().start;
             self.object(object.get_ref(), at)?;
+        }
+        self.loaded.description.return_if_near();
+        // The objects decide what the camera is relative to.
+        if let Some(camera) = file.camera {
+            let at = camera.span().start;
+            let offset = self.loaded.description.offset;
+            let settings = camera_settings(&camera.into_inner(), file.up, offset)
+                .map_err(|kind| self.error(at, kind))?;
+            self.loaded.description.camera = Some(settings);
         }
         Ok(())
     }
@@ -529,8 +545,8 @@ impl Reader<'_> {
     }
 
     fn object(&mut self, table: &ObjectTable, at: usize) -> Result<(), LoadError> {
-        let matrix = matrix(table).map_err(|kind| self.error(at, kind))?;
-        if self.add_copy(&table.key(), &matrix)? {
+        let placement = Placement::new(table).map_err(|kind| self.error(at, kind))?;
+        if self.add_copy(&table.key(), &placement)? {
             return Ok(());
         }
         let mut loaded = match (&table.file, &table.builtin) {
@@ -551,7 +567,12 @@ impl Reader<'_> {
         };
         self.loaded.warnings.append(&mut loaded.warnings);
         let mut description = loaded.description;
-        description.transform(&matrix);
+        let offsets = [self.loaded.description.offset, description.offset];
+        if self.may_be_far || offsets != [DVec3::ZERO; 2] {
+            description.place(&placement.matrix, placement.translation);
+        } else {
+            description.transform(&placement.matrix);
+        }
         // The scene file decides which axis points up.
         description.up = None;
         if let Some(name) = table.name.as_deref().map(part_name) {
@@ -570,7 +591,7 @@ impl Reader<'_> {
                 part.material = material;
             }
         }
-        self.share(table.key(), first, first_instance, matrix);
+        self.share(table.key(), first, first_instance, placement);
         Ok(())
     }
 
@@ -582,23 +603,25 @@ impl Reader<'_> {
 
     /// Lets later objects of the same kind share the memory of the last one, which begins at a part and an instance, if
     /// its copies would take much and are opaque.
-    fn share(&mut self, key: ObjectKey, first: usize, first_instance: usize, matrix: Mat4) {
+    fn share(&mut self, key: ObjectKey, first: usize, first_instance: usize, placement: Placement) {
         let SceneDescription { parts, instances, materials, .. } = &self.loaded.description;
         let n_copies = self.n_objects.get(&key).map_or(0, |n| n - 1);
         let own = parts[first..].iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
         let is_large = n_copies.saturating_mul(own as u64) > SHARED_TRIANGLES;
         if is_large && parts[first..].iter().all(|part| part.is_opaque(materials)) {
             let (parts, instances) = (first..parts.len(), first_instance..instances.len());
-            self.shared.entry(key).or_insert(SharedObject { parts, instances, matrix });
+            self.shared.entry(key).or_insert(SharedObject { parts, instances, placement });
         }
     }
 
     /// Adds an object as a copy of an earlier one. Returns whether it is one.
-    fn add_copy(&mut self, key: &ObjectKey, matrix: &Mat4) -> Result<bool, LoadError> {
-        let Some(SharedObject { parts, instances, matrix: first }) = self.shared.get(key) else {
+    fn add_copy(&mut self, key: &ObjectKey, placement: &Placement) -> Result<bool, LoadError> {
+        let Some(SharedObject { parts, instances, placement: first }) = self.shared.get(key) else {
             return Ok(false);
         };
-        let transform = conjugated(matrix, &Mat4::IDENTITY, first);
+        let offset = self.loaded.description.offset;
+        let inverse = first.relative_to(offset).inverse();
+        let transform = (placement.relative_to(offset) * inverse).as_mat4();
         if Similarity::from_matrix(&transform).is_none() {
             return Ok(false);
         }
@@ -608,7 +631,8 @@ impl Reader<'_> {
         all.extend(parts.clone().map(|part| Instance { part, transform }));
         for i in instances.clone() {
             let Instance { part, transform: inner } = all[i];
-            all.push(Instance { part, transform: conjugated(&transform, &inner, &Mat4::IDENTITY) });
+            let transform = (transform.as_dmat4() * inner.as_dmat4()).as_mat4();
+            all.push(Instance { part, transform });
         }
         Ok(true)
     }
@@ -627,7 +651,11 @@ fn one_of(what: &str) -> TomlErrorKind {
     TomlErrorKind::OneOf { what: what.into(), first: "file", second: "builtin" }
 }
 
-fn camera_settings(table: &CameraTable, up: UpAxis) -> Result<CameraSettings, TomlErrorKind> {
+fn camera_settings(
+    table: &CameraTable,
+    up: UpAxis,
+    offset: DVec3,
+) -> Result<CameraSettings, TomlErrorKind> {
     let projection = match (table.fov, table.orthographic) {
         (Some(_), Some(_)) => {
             let (first, second) = ("fov", "orthographic");
@@ -640,34 +668,58 @@ fn camera_settings(table: &CameraTable, up: UpAxis) -> Result<CameraSettings, To
     };
     let settings = CameraSettings {
         projection,
-        origin: table.origin.into(),
-        target: table.target.into(),
+        origin: (DVec3::from(table.origin) - offset).as_vec3(),
+        target: (DVec3::from(table.target) - offset).as_vec3(),
         up: table.up.map_or(up.vector(), Vec3::from),
     };
     settings.check()?;
     Ok(settings)
 }
 
-/// Scale, then rotation about x, y and z, then translation; or the matrix.
-fn matrix(table: &ObjectTable) -> Result<Mat4, TomlErrorKind> {
-    let others = table.scale.is_some() || table.rotate.is_some() || table.translate.is_some();
-    let m = match table.matrix {
-        Some(_) if others => return Err(TomlErrorKind::MatrixAndOthers),
-        Some(rows) if rows[3] != [0.0, 0.0, 0.0, 1.0] => return Err(TomlErrorKind::NotAffine),
-        Some(rows) => Mat4::from_cols_array_2d(&rows).transpose(),
-        None => {
-            let scale = match table.scale {
-                None => Vec3::ONE,
-                Some(Scale::Uniform(s)) => Vec3::splat(s),
-                Some(Scale::Axes(s)) => s.into(),
-            };
-            let [x, y, z] = table.rotate.unwrap_or_default().map(f32::to_radians);
-            Mat4::from_translation(table.translate.unwrap_or_default().into())
-                * Mat4::from_mat3(rotation_z(z) * rotation_y(y) * rotation_x(x))
-                * Mat4::from_scale(scale)
+/// The place of an object.
+#[derive(Clone, Copy)]
+struct Placement {
+    matrix: Mat4,
+    /// That of the matrix, as precise as it is given.
+    translation: DVec3,
+}
+
+impl Placement {
+    /// Scale, then rotation about x, y and z, then translation; or the matrix.
+    fn new(table: &ObjectTable) -> Result<Self, TomlErrorKind> {
+        let others = table.scale.is_some() || table.rotate.is_some() || table.translate.is_some();
+        let (matrix, translation) = match table.matrix {
+            Some(_) if others => return Err(TomlErrorKind::MatrixAndOthers),
+            Some(rows) if rows[3] != [0.0, 0.0, 0.0, 1.0] => return Err(TomlErrorKind::NotAffine),
+            Some(rows) => {
+                let m = DMat4::from_cols_array_2d(&rows).transpose();
+                (m.as_mat4(), m.w_axis.truncate())
+            }
+            None => {
+                let scale = match table.scale {
+                    None => Vec3::ONE,
+                    Some(Scale::Uniform(s)) => Vec3::splat(s),
+                    Some(Scale::Axes(s)) => s.into(),
+                };
+                let [x, y, z] = table.rotate.unwrap_or_default().map(f32::to_radians);
+                let translation = DVec3::from(table.translate.unwrap_or_default());
+                let matrix = Mat4::from_translation(translation.as_vec3())
+                    * Mat4::from_mat3(rotation_z(z) * rotation_y(y) * rotation_x(x))
+                    * Mat4::from_scale(scale);
+                (matrix, translation)
+            }
+        };
+        let columns: [Vec4; 4] = [matrix.x_axis, matrix.y_axis, matrix.z_axis, matrix.w_axis];
+        let is_finite = columns.iter().all(|c| c.is_finite());
+        let usable = is_finite && linear_part(&matrix).determinant() != 0.0;
+        if usable { Ok(Self { matrix, translation }) } else { Err(TomlErrorKind::Singular) }
+    }
+
+    /// The transform to coordinates relative to a point of the scene.
+    fn relative_to(&self, offset: DVec3) -> DMat4 {
+        if offset == DVec3::ZERO {
+            return self.matrix.as_dmat4();
         }
-    };
-    let columns: [Vec4; 4] = [m.x_axis, m.y_axis, m.z_axis, m.w_axis];
-    let usable = columns.iter().all(|c| c.is_finite()) && linear_part(&m).determinant() != 0.0;
-    if usable { Ok(m) } else { Err(TomlErrorKind::Singular) }
+        DMat4 { w_axis: (self.translation - offset).extend(1.0), ..self.matrix.as_dmat4() }
+    }
 }

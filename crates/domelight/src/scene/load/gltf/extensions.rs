@@ -16,7 +16,8 @@ pub(super) enum Effect {
     Unknown,
 }
 
-const READ: [&str; 20] = [
+const READ: [&str; 21] = [
+    "CESIUM_RTC",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_avif",

@@ -4,34 +4,40 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
+use glam::DMat4;
+
+use super::accessor::{component_range, normalized};
 use super::animation::{NodePose, choose};
 use super::error::{Failure, GltfErrorKind};
 use super::instancing::{self, unit_quaternion};
 use super::json;
 use super::source::Source;
-use crate::math::{Mat4, Vec3};
-use crate::scene::{CameraSettings, NamedCamera, Projection};
+use crate::math::{DVec3, Mat4, Vec3};
+use crate::scene::{CameraSettings, NamedCamera, Projection, offset};
 
 const MAX_DEPTH: usize = 200;
 
 /// One placement of a mesh.
 #[derive(Clone, Debug)]
 pub(super) struct Placement {
-    pub(super) world: Mat4,
+    pub(super) world: DMat4,
     pub(super) skin: Option<usize>,
     /// Weights of the morph targets; if empty, the mesh's weights apply.
     pub(super) weights: Vec<f32>,
 }
 
-/// The nodes of a scene in world space.
+/// The nodes of a scene in world space. Transforms are composed in double precision.
 pub(super) struct Graph<'g, 's> {
     source: &'g Source<'s>,
     poses: HashMap<usize, NodePose>,
     /// The placements of each mesh.
     pub(super) placements: BTreeMap<usize, Vec<Placement>>,
-    pub(super) cameras: Vec<NamedCamera>,
+    /// What all world transforms are relative to.
+    pub(super) offset: DVec3,
+    /// The index of each placed camera, the name of its node, and its place.
+    cameras: Vec<(usize, String, DMat4)>,
     /// World transforms of the visited nodes.
-    worlds: Vec<Option<Mat4>>,
+    worlds: Vec<Option<DMat4>>,
     /// The joints of skins.
     skins: RefCell<HashMap<usize, Rc<[Mat4]>>>,
 }
@@ -49,10 +55,12 @@ impl<'g, 's> Graph<'g, 's> {
             source,
             poses,
             placements: BTreeMap::new(),
+            offset: DVec3::ZERO,
             cameras: Vec::new(),
             worlds: vec![None; document.count::<json::Node>()],
             skins: RefCell::default(),
         };
+        let root = rtc_center(source)?.map_or(DMat4::IDENTITY, DMat4::from_translation);
         let count = document.count::<json::Scene>();
         let index = match scene {
             Some(asked) => {
@@ -67,18 +75,74 @@ impl<'g, 's> Graph<'g, 's> {
         };
         if let Some(index) = index {
             for node in document.get::<json::Scene>(index)?.nodes {
-                graph.node(node, Mat4::IDENTITY, 0)?;
+                graph.node(node, root, 0)?;
             }
         } else {
-            let (world, skin, weights) = (Mat4::IDENTITY, None, Vec::new());
+            let (world, skin, weights) = (root, None, Vec::new());
             let once = vec![Placement { world, skin, weights }];
             let meshes = 0..document.count::<json::Mesh>();
             graph.placements = meshes.map(|mesh| (mesh, once.clone())).collect();
         }
+        graph.move_near();
         Ok(graph)
     }
 
-    fn node(&mut self, index: usize, parent: Mat4, depth: usize) -> Result<(), Failure> {
+    /// Makes all places relative to a point nearby, if they are far away.
+    fn move_near(&mut self) {
+        let meshes = self.placements.iter();
+        let boxes = meshes.flat_map(|(&mesh, placements)| self.boxes(mesh, placements));
+        let offset = offset::of_points(boxes.flatten());
+        if offset == DVec3::ZERO {
+            return;
+        }
+        self.offset = offset;
+        let placed = self.placements.values_mut().flatten().map(|placement| &mut placement.world);
+        let cameras = self.cameras.iter_mut().map(|(_, _, world)| world);
+        let worlds = self.worlds.iter_mut().flatten();
+        for world in placed.chain(cameras).chain(worlds) {
+            *world = DMat4::from_translation(-offset) * *world;
+        }
+        self.skins.borrow_mut().clear();
+    }
+
+    /// The corners of boxes around the places of a mesh. What cannot be read has none; it is reported later, if it is used.
+    fn boxes(&self, mesh: usize, placements: &[Placement]) -> impl Iterator<Item = [DVec3; 8]> {
+        let mesh = self.source.document.get::<json::Mesh>(mesh).ok();
+        let primitives = mesh.into_iter().flat_map(|mesh| mesh.primitives);
+        primitives.filter_map(|primitive| self.box_of(&primitive)).flat_map(move |corners| {
+            let placed = placements.iter().flat_map(|placement| self.transforms(placement));
+            placed.map(move |world| corners.map(|corner| world.transform_point3(corner)))
+        })
+    }
+
+    /// The transforms from a mesh to the world.
+    fn transforms(&self, placement: &Placement) -> Vec<DMat4> {
+        let joints = placement.skin.and_then(|skin| self.precise_joints(skin).ok());
+        joints.unwrap_or_else(|| vec![placement.world])
+    }
+
+    /// The corners of the box around a primitive: that of its accessor, or else of the positions.
+    fn box_of(&self, primitive: &json::Primitive) -> Option<[DVec3; 8]> {
+        let index = *primitive.attributes.get("POSITION")?;
+        let accessor: json::Accessor = self.source.document.get(index).ok()?;
+        let [min, max] = if let Some(range) = accessor.range() {
+            let divisor = component_range(&accessor);
+            let value = |v: f64| divisor.map_or(v, |divisor| normalized(v as f32, divisor).into());
+            range.map(|corner| DVec3::from(corner.map(value)))
+        } else if primitive.extensions.draco.is_none() && accessor.buffer_view.is_some() {
+            let positions = self.source.floats::<3>(index, "VEC3", "POSITION").ok()?;
+            let positions = positions.into_iter().map(|p| Vec3::from(p).as_dvec3());
+            let finite = positions.filter(|position| position.is_finite());
+            let around = |[min, max]: [DVec3; 2], p: DVec3| [min.min(p), max.max(p)];
+            finite.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], around)
+        } else {
+            return None;
+        };
+        let side = |i: usize, axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
+        Some(std::array::from_fn(|i| DVec3::new(side(i, 0), side(i, 1), side(i, 2))))
+    }
+
+    fn node(&mut self, index: usize, parent: DMat4, depth: usize) -> Result<(), Failure> {
         let node: json::Node = self.source.document.get(index)?;
         let pose = self.poses.get(&index);
         let world = parent * local(&node, pose);
@@ -99,13 +163,13 @@ impl<'g, 's> Graph<'g, 's> {
                 None => vec![Mat4::IDENTITY],
             };
             let placements = instances.into_iter().map(|instance| {
-                let (world, weights) = (world * instance, weights.clone());
+                let (world, weights) = (world * instance.as_dmat4(), weights.clone());
                 Placement { world, skin: node.skin, weights }
             });
             self.placements.entry(mesh).or_default().extend(placements);
         }
         if let Some(camera) = node.camera {
-            self.camera(camera, &node.name, &world)?;
+            self.cameras.push((camera, node.name, world));
         }
         for child in node.children {
             self.node(child, world, depth + 1)?;
@@ -113,22 +177,25 @@ impl<'g, 's> Graph<'g, 's> {
         Ok(())
     }
 
-    /// Adds a camera, which may have the name of its node. An unusable camera is left out with a warning, unless the load
-    /// is strict.
-    fn camera(&mut self, index: usize, node: &str, world: &Mat4) -> Result<(), Failure> {
-        let camera: json::Camera = self.source.document.get(index)?;
-        let name = if camera.name.is_empty() { node } else { &*camera.name }.to_owned();
-        match camera_settings(&camera, world) {
-            Ok(settings) => self.cameras.push(NamedCamera { name, settings }),
-            Err(problem) if self.source.strict => {
-                let problem = GltfErrorKind::Camera { problem };
-                return Err(problem.within(format!("camera {index} ('{name}')")).into());
-            }
-            Err(problem) => {
-                self.source.warn(&format!("camera {index} ('{name}'): {problem}; it is left out"));
+    /// The cameras, each of which may have the name of its node. An unusable camera is left out with a warning, unless
+    /// the load is strict.
+    pub(super) fn cameras(&self) -> Result<Vec<NamedCamera>, Failure> {
+        let mut cameras = Vec::with_capacity(self.cameras.len());
+        for (index, node, world) in &self.cameras {
+            let camera: json::Camera = self.source.document.get(*index)?;
+            let name = if camera.name.is_empty() { node } else { &camera.name }.to_owned();
+            match camera_settings(&camera, &world.as_mat4()) {
+                Ok(settings) => cameras.push(NamedCamera { name, settings }),
+                Err(problem) if self.source.strict => {
+                    let problem = GltfErrorKind::Camera { problem };
+                    return Err(problem.within(format!("camera {index} ('{name}')")).into());
+                }
+                Err(problem) => self
+                    .source
+                    .warn(&format!("camera {index} ('{name}'): {problem}; it is left out")),
             }
         }
-        Ok(())
+        Ok(cameras)
     }
 
     /// The matrices of a skin's joints, from the mesh to the world.
@@ -136,6 +203,12 @@ impl<'g, 's> Graph<'g, 's> {
         if let Some(joints) = self.skins.borrow().get(&index) {
             return Ok(joints.clone());
         }
+        let joints = self.precise_joints(index)?.iter().map(DMat4::as_mat4).collect::<Rc<[_]>>();
+        self.skins.borrow_mut().insert(index, joints.clone());
+        Ok(joints)
+    }
+
+    fn precise_joints(&self, index: usize) -> Result<Vec<DMat4>, Failure> {
         let skin: json::Skin = self.source.document.get(index)?;
         let inverse: Vec<[f32; 16]> = match skin.inverse_bind_matrices {
             Some(accessor) => self.source.floats(accessor, "MAT4", "inverse bind matrices")?,
@@ -153,32 +226,45 @@ impl<'g, 's> Graph<'g, 's> {
                 self.source.warn(&format!(
                     "skin {index} uses joints outside of the scene, which stay at the origin"
                 ));
-                Mat4::IDENTITY
+                DMat4::from_translation(-self.offset)
             });
             let bind = inverse.get(i).map_or(Mat4::IDENTITY, Mat4::from_cols_array);
-            joints.push(world * bind);
+            joints.push(world * bind.as_dmat4());
         }
-        let joints: Rc<[Mat4]> = joints.into();
-        self.skins.borrow_mut().insert(index, joints.clone());
         Ok(joints)
     }
 }
 
 /// A node's local matrix; animated properties replace those of the file.
-fn local(node: &json::Node, pose: Option<&NodePose>) -> Mat4 {
+fn local(node: &json::Node, pose: Option<&NodePose>) -> DMat4 {
     let of_pose = |part: fn(&NodePose) -> bool| pose.is_some_and(part);
     let moved = of_pose(|p| p.translation.or(p.scale).is_some() || p.rotation.is_some());
     if let (Some(matrix), false) = (&node.matrix, moved) {
-        return Mat4::from_cols_array(matrix);
+        return DMat4::from_cols_array(matrix);
     }
-    let translation = pose.and_then(|p| p.translation).or(node.translation);
+    let translation = pose.and_then(|p| p.translation).map(|t| t.map(f64::from));
+    let translation = translation.or(node.translation).map_or(DVec3::ZERO, DVec3::from);
     let rotation = pose.and_then(|p| p.rotation).or(node.rotation);
     let scale = pose.and_then(|p| p.scale).or(node.scale);
-    Mat4::from_scale_rotation_translation(
+    let linear = Mat4::from_scale_rotation_translation(
         scale.map_or(Vec3::ONE, Vec3::from),
         rotation.map_or(glam::Quat::IDENTITY, unit_quaternion),
-        translation.map_or(Vec3::ZERO, Vec3::from),
-    )
+        Vec3::ZERO,
+    );
+    DMat4 { w_axis: translation.extend(1.0), ..linear.as_dmat4() }
+}
+
+/// The point that `CESIUM_RTC` adds to all positions. One that is unusable is left out with a warning, unless the load is
+/// strict.
+fn rtc_center(source: &Source<'_>) -> Result<Option<DVec3>, GltfErrorKind> {
+    match source.document.rtc_center() {
+        Ok(center) => Ok(center.map(DVec3::from)),
+        Err(problem) if source.strict => Err(problem),
+        Err(problem) => {
+            source.warn(&format!("{problem}; the center is left out"));
+            Ok(None)
+        }
+    }
 }
 
 /// Camera settings: a glTF camera looks along its node's −Z, with +Y up. The error is why the camera is unusable.

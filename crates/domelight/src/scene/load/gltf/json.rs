@@ -30,6 +30,8 @@ pub(super) struct Document<'a> {
     pub(super) extensions_required: Vec<String>,
     pub(super) scene: Option<usize>,
     #[serde(borrow)]
+    extensions: Option<&'a RawValue>,
+    #[serde(borrow)]
     accessors: Vec<&'a RawValue>,
     #[serde(borrow)]
     animations: Vec<&'a RawValue>,
@@ -55,6 +57,18 @@ pub(super) struct Document<'a> {
     skins: Vec<&'a RawValue>,
     #[serde(borrow)]
     textures: Vec<&'a RawValue>,
+}
+
+/// What extensions say of the whole document.
+#[derive(Deserialize)]
+struct DocumentExtensions {
+    #[serde(rename = "CESIUM_RTC")]
+    rtc: Option<RelativeToCenter>,
+}
+
+#[derive(Deserialize)]
+struct RelativeToCenter {
+    center: [f64; 3],
 }
 
 /// The parts of the document that identify the version.
@@ -94,6 +108,14 @@ impl<'a> Document<'a> {
             let place = format!("{} {index}", T::NAME);
             GltfErrorKind::Json { place, source }
         })
+    }
+
+    /// The point that `CESIUM_RTC` adds to all positions, if the file has that extension.
+    pub(super) fn rtc_center(&self) -> Result<Option<[f64; 3]>, GltfErrorKind> {
+        let Some(text) = self.extensions else { return Ok(None) };
+        let extensions: DocumentExtensions = serde_json::from_str(text.get())
+            .map_err(|source| GltfErrorKind::Json { place: "CESIUM_RTC".into(), source })?;
+        Ok(extensions.rtc.map(|rtc| rtc.center))
     }
 
     /// The number of items.
@@ -172,6 +194,21 @@ pub(super) struct Accessor {
     #[serde(rename = "type")]
     pub(super) shape: String,
     pub(super) sparse: Option<Sparse>,
+    #[serde(default)]
+    min: serde_json::Value,
+    #[serde(default)]
+    max: serde_json::Value,
+}
+
+impl Accessor {
+    /// The smallest and the largest value of each of three components, as the file gives them, if it does.
+    pub(super) fn range(&self) -> Option<[[f64; 3]; 2]> {
+        let numbers = |value: &serde_json::Value| {
+            let [x, y, z] = value.as_array()?.as_slice() else { return None };
+            Some([x.as_f64()?, y.as_f64()?, z.as_f64()?])
+        };
+        Some([numbers(&self.min)?, numbers(&self.max)?])
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -239,8 +276,8 @@ pub(super) struct Node {
     #[serde(deserialize_with = "name")]
     pub(super) name: String,
     pub(super) children: Vec<usize>,
-    pub(super) matrix: Option<[f32; 16]>,
-    pub(super) translation: Option<[f32; 3]>,
+    pub(super) matrix: Option<[f64; 16]>,
+    pub(super) translation: Option<[f64; 3]>,
     pub(super) rotation: Option<[f32; 4]>,
     pub(super) scale: Option<[f32; 3]>,
     pub(super) mesh: Option<usize>,

@@ -9,7 +9,7 @@
 //! | triangle lists, strips and fans, two sets of texture coordinates, vertex colors | [`geometry`] |
 //! | tangents, if a normal map needs them and the file has none | [`tangents`] |
 //! | skins and morph targets, at rest or at one time of an animation | [`deform`], [`animation`] |
-//! | nodes, `EXT_mesh_gpu_instancing`, `KHR_node_visibility`, scenes, cameras | [`graph`], [`instancing`] |
+//! | nodes, `CESIUM_RTC`, `EXT_mesh_gpu_instancing`, `KHR_node_visibility`, scenes, cameras | [`graph`], [`instancing`] |
 //! | materials and their extensions, `KHR_texture_transform` | [`material`] |
 //! | PNG, JPEG, WebP (`EXT_texture_webp`), KTX2 (`KHR_texture_basisu`) | [`image`](mod@image), [`ktx2`] |
 //!
@@ -89,7 +89,7 @@ fn read(
         read_mesh(&source, &graph, &mut materials, mesh, placements, &mut shown)?;
     }
     let (materials, textures) = materials.finish(|text| source.warn(text));
-    let cameras = graph.cameras;
+    let cameras = graph.cameras()?;
     let description = SceneDescription {
         parts,
         instances,
@@ -98,6 +98,7 @@ fn read(
         camera: cameras.first().map(|camera| camera.settings),
         cameras,
         up: Some(UpAxis::Y),
+        offset: graph.offset,
         ..SceneDescription::default()
     };
     Ok(Loaded { description, warnings: source.into_warnings(), ..Loaded::default() })
@@ -125,7 +126,8 @@ fn shared_places(
         return Ok(None);
     }
     let transform = |copy: &Placement| {
-        let transform = conjugated(&copy.world, &Mat4::IDENTITY, &first.world);
+        let [place, first] = [copy, first].map(|placement| placement.world.as_mat4());
+        let transform = conjugated(&place, &Mat4::IDENTITY, &first);
         Similarity::from_matrix(&transform).map(|_| transform)
     };
     Ok(copies.iter().map(transform).collect())
@@ -157,9 +159,9 @@ fn read_mesh(
                 deformations.skin = true;
                 Pose::Skinned(graph.joints(skin).map_err(|e| e.within(|| format!("skin {skin}")))?)
             }
-            None => Pose::Rigid(placement.world),
+            None => Pose::Rigid(placement.world.as_mat4()),
         };
-        poses.push((pose, placement.world, weights));
+        poses.push((pose, placement.world.as_mat4(), weights));
     }
     let name = if mesh.name.is_empty() { format!("mesh {index}") } else { part_name(&mesh.name) };
     let mut told = HashSet::new();
