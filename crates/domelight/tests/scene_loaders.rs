@@ -152,6 +152,125 @@ fn line_ends_of_other_systems() {
     assert_eq!(loaded.description.parts[0].mesh.triangles.len(), 2);
 }
 
+/// A quadrilateral with texture coordinates of its corners, as MeshLab writes it.
+const TEXTURED_PLY: &str = "ply
+format ascii 1.0
+comment TextureFile   my picture.png
+element vertex 4
+property float x
+property float y
+property float z
+property uchar red
+property uchar green
+property uchar blue
+element face 2
+property list uchar int vertex_indices
+property list uchar float texcoord
+end_header
+0 0 0 9 9 9
+1 0 0 9 9 9
+1 1 0 9 9 9
+0 1 0 9 9 9
+3 0 1 2 6 0 0 1 0 1 0.25
+3 0 2 3 6 0.5 0 nan 1 0 1
+";
+
+#[test]
+fn textures_of_a_ply_have_coordinates_of_corners() {
+    let folder = Folder::new().with("a.ply", TEXTURED_PLY);
+    let plain = folder.load("a.ply");
+    assert!(plain.warnings[0].contains("my picture.png") && plain.warnings[0].contains("left out"));
+    assert_eq!(plain.description.parts[0].mesh.colors.len(), 4);
+
+    let folder = folder.with_image("my picture.png", [255, 0, 0]);
+    let loaded = folder.load("a.ply");
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    let d = &loaded.description;
+    let MaterialModel::Phong(model) = &d.materials[d.parts[0].material].model else { panic!() };
+    assert_eq!((model.diffuse, model.diffuse_texture.map(|t| t.texture)), (Rgb::WHITE, Some(0)));
+    let mesh = &d.parts[0].mesh;
+    // The texture takes the place of colors.
+    assert!(mesh.colors.is_empty() && d.textures.len() == 1);
+    let uvs = mesh.triangles.as_flattened().iter().map(|&i| mesh.uvs[i as usize]);
+    let expected =
+        [[0.0, 1.0], [1.0, 1.0], [1.0, 0.75], [0.5, 1.0], [0.0, 1.0], [0.0, 0.0]].map(Vec2::from);
+    assert!(uvs.eq(expected));
+
+    // A path of another computer, and coordinates of vertices.
+    let of_vertices = "ply\nformat ascii 1.0\ncomment TextureFile C:\\scans\\my picture.png
+element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float s\nproperty float t
+element face 1\nproperty list uchar int vertex_indices\nend_header
+0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 0.25\n3 0 1 2\n";
+    let d = folder.with("b.ply", of_vertices).load("b.ply").description;
+    assert_eq!((d.textures.len(), d.parts[0].mesh.uvs[2]), (1, vec2(0.0, 0.75)));
+}
+
+#[test]
+fn faces_of_a_ply_choose_among_textures() {
+    let text = TEXTURED_PLY
+        .replace(
+            "comment TextureFile   my picture.png",
+            "comment TextureFile a.png\ncomment TextureFile b.png",
+        )
+        .replace("element face 2", "element face 3")
+        .replace("end_header", "property int texnumber\nend_header")
+        .replace("0.25\n", "0.25 1\n")
+        .replace("nan 1 0 1\n", "1 1 0 1 0\n3 0 1 3 6 0 0 0 0 0 0 -1\n");
+    let folder = Folder::new().with("a.ply", text);
+    let folder = folder.with_image("a.png", [255, 0, 0]).with_image("b.png", [0, 255, 0]);
+    let d = folder.load("a.ply").description;
+    let textures = d.parts.iter().map(|part| match &d.materials[part.material].model {
+        MaterialModel::Phong(model) => model.diffuse_texture.map(|t| t.texture),
+        _ => None,
+    });
+    assert_eq!(textures.collect::<Vec<_>>(), [Some(0), Some(1), None]);
+    assert!(d.parts.iter().all(|part| part.mesh.triangles == [[0, 1, 2]]));
+    let of_first = d.parts[0].mesh.positions.iter().map(|p| p.truncate()).collect::<Vec<_>>();
+    assert_eq!(of_first, [vec2(0.0, 0.0), vec2(1.0, 1.0), vec2(0.0, 1.0)]);
+}
+
+#[test]
+fn more_values_than_the_header_says_are_left_out() {
+    let more =
+        |text: &str| text.replace("1 1 0\n", "1 1 0 0.5 0.5\n").replace("3 0 1 2\n", "3 0 1 2 7\n");
+    let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z
+element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n3 0 1 2\n";
+    let (plain, extended) = (one("a.ply", text), one("a.ply", more(text)));
+    assert!(plain.warnings.is_empty());
+    let warnings = &extended.warnings;
+    assert!(warnings.len() == 1 && warnings[0].contains("2 rows"), "{warnings:?}");
+    let mesh = |loaded: &Loaded| loaded.description.parts[0].mesh.clone();
+    assert_eq!(mesh(&plain).positions, mesh(&extended).positions);
+    assert_eq!(mesh(&plain).triangles, mesh(&extended).triangles);
+    fails_if_strict("a.ply", more(text), &["more values", "--strict"]);
+    // Rows need not be lines.
+    let flowing = text.replace("0 0 0\n1 0 0\n1 1 0\n", "0 0\n0 1 0 0\n1 1 0 ");
+    assert_eq!(mesh(&one("a.ply", flowing)).positions, mesh(&plain).positions);
+}
+
+#[test]
+fn libraries_of_another_computer_lie_beside_the_obj() {
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+    let names = ["C:\\My models\\my red.mtl", "/home/me/my red.mtl", "\"C:\\models\\my red.mtl\""];
+    for name in names {
+        let folder = Folder::new()
+            .with("a.obj", format!("mtllib {name}\n{triangle}"))
+            .with("my red.mtl", "newmtl red\nKd 1 0 0\nmap_Kd red.png\n")
+            .with_image("red.png", [255, 0, 0]);
+        let loaded = folder.load("a.obj");
+        assert!(loaded.warnings.is_empty(), "{name}: {:?}", loaded.warnings);
+        assert_eq!(loaded.description.materials[0].name, "red", "{name}");
+        assert_eq!(loaded.description.textures.len(), 1, "{name}");
+    }
+    // Several names, of which one is not there.
+    let folder = Folder::new()
+        .with("a.obj", format!("mtllib red.mtl none/blue.mtl\n{triangle}"))
+        .with("red.mtl", "newmtl red\nKd 1 0 0\n")
+        .with("blue.mtl", "newmtl blue\nKd 0 0 1\n");
+    let names = folder.load("a.obj").description.materials.into_iter().map(|m| m.name);
+    assert!(names.eq(["red", "blue"]));
+}
+
 fn binary_ply(big: bool) -> Vec<u8> {
     let name = if big { "binary_big_endian" } else { "binary_little_endian" };
     let mut out = format!(

@@ -475,6 +475,11 @@ fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
+/// The name of a file at the end of a path of any system.
+fn last_part(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
 /// A path that a file gives, relative to that file; backslashes count as slashes. `-` is a file of that name: what reads
 /// standard input is up to the user.
 fn relative(file: &Path, path: &str) -> PathBuf {

@@ -213,18 +213,7 @@ impl Reader<'_, '_> {
         let parsed = options(line.keyword, line.rest);
         let (file, texture, bump) = parsed.map_err(|kind| self.error(line, kind))?;
         let referrer = format!("{}, line {}", self.path.display(), line.number);
-        let path = super::relative(self.path, file);
-        let found = self.textures.file_of(&path, content, &referrer).or_else(|error| {
-            // A path of the computer where the file was made: its last part, beside the library.
-            let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
-            match (&error, super::relative(self.path, name)) {
-                (LoadError::ReadReferenced { .. }, beside) if beside != path => {
-                    self.textures.file_of(&beside, content, &referrer).map_err(|_| error)
-                }
-                _ => Err(error),
-            }
-        });
-        match found {
+        match self.textures.named_in(self.path, file, content, &referrer) {
             Ok(index) => Ok(Some((TextureRef { texture: index, ..texture }, bump))),
             Err(error) if !self.strict && error.is_about_one_image() => {
                 self.warnings.push(format!("{error}; it is left out"));

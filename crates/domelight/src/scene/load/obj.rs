@@ -20,7 +20,9 @@ use super::polygon::Triangulator;
 use super::smoothing::Smoothing;
 use super::textures::Textures;
 use super::wavefront::{ObjErrorKind, enough, lines, number, numbers, unquoted, words};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, mtl, non_finite, part_name, stem};
+use super::{
+    Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, last_part, mtl, non_finite, part_name, stem,
+};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -266,12 +268,38 @@ impl<'a> Reader<'a> {
     /// Reads a material library, or several; one that is missing is a warning.
     fn library(&mut self, line: usize, names: &str) -> Result<(), LoadError> {
         let names = unquoted(names);
-        // A name may hold spaces.
-        let path = super::relative(self.path, names);
-        if names.contains(char::is_whitespace) && !self.textures.budget.exists(&path) {
-            return words(names).try_for_each(|name| self.one_library(line, name));
+        let exists = |name: &str| {
+            let path = super::relative(self.path, name);
+            self.textures.budget.exists(&path)
+        };
+        // A name may hold spaces, and so may a path of the computer where the file was made.
+        let is_one = !names.contains(char::is_whitespace)
+            || exists(names)
+            || !words(names).any(exists) && exists(last_part(names));
+        if is_one {
+            return self.one_library(line, names);
         }
-        self.one_library(line, names)
+        words(names).try_for_each(|name| self.one_library(line, name))
+    }
+
+    /// The bytes of a library: from where the file says, or else, if that is a path of the computer where the file was
+    /// made, from its last part beside the file.
+    fn read_library(
+        &self,
+        path: PathBuf,
+        name: &str,
+        place: &str,
+    ) -> (PathBuf, Result<Vec<u8>, LoadError>) {
+        let read = |path: &Path| super::read_referenced(path, place, self.textures.budget);
+        let found = read(&path);
+        let beside = super::relative(self.path, last_part(name));
+        if !matches!(found, Err(LoadError::ReadReferenced { .. })) || beside == path {
+            return (path, found);
+        }
+        match read(&beside) {
+            Ok(bytes) => (beside, Ok(bytes)),
+            Err(_) => (path, found),
+        }
     }
 
     fn one_library(&mut self, line: usize, name: &str) -> Result<(), LoadError> {
@@ -280,7 +308,8 @@ impl<'a> Reader<'a> {
             return Ok(());
         }
         let place = format!("{}, line {line}", self.path.display());
-        let why = match super::read_referenced(&path, &place, self.textures.budget) {
+        let (path, found) = self.read_library(path, name, &place);
+        let why = match found {
             // Report nothing of the content of another file.
             Ok(bytes) if !mtl::is_library(&super::utf8_of(&bytes)) => {
                 "it is not a material library (MTL)".to_owned()

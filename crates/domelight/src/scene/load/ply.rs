@@ -6,18 +6,26 @@
 //! strip. Elements and properties may come in any order. Everything else is ignored. A file without normals gets
 //! smooth ones.
 //!
+//! `comment TextureFile NAME`, as MeshLab writes it, names a texture, which takes the place of colors. Its coordinates are
+//! those of vertices, or the list `texcoord` of faces, with two numbers a corner; with several textures, `texnumber` of
+//! a face says which.
+//!
 //! We do not use a PLY crate, because the existing ones build a map of properties for every row.
 
+use std::collections::HashMap;
 use std::fmt;
 use std::path::Path;
 
-use super::faces::{Polygons, color_triangles};
+use super::faces::{Polygons, color_triangles, map_corners};
+use super::textures::{Content, Textures};
 use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, line_end, non_finite};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::scene::offset;
-use crate::scene::texture::{Encoding, decode};
+use crate::scene::texture::{Encoding, Texture, decode};
+use crate::scene::{
+    Material, MaterialModel, Part, PhongMaterial, SceneDescription, TextureRef, offset,
+};
 
 /// A position in a PLY file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -106,6 +114,11 @@ pub enum PlyErrorKind {
         /// How many vertices there are.
         vertices: usize,
     },
+    /// A row with more values than the header says.
+    #[error(
+        "there are more values in the line than the header says; without --strict they are left out"
+    )]
+    ExtraValues,
     /// A vertex with a non-finite position.
     #[error("the position is not finite: {position}; without --strict its triangles are left out")]
     NotFinite {
@@ -126,11 +139,24 @@ pub(super) fn load(
     let header = Header::parse(bytes).map_err(error)?;
     header.check_size(bytes.len() - header.length).map_err(error)?;
     budget.take(&path.display().to_string(), header.memory(bytes.len() - header.length))?;
-    let Parsed { body: Body { mesh, offset, non_finite_colors }, rest } =
-        parse(&header, bytes, strict).map_err(error)?;
+    let Parsed { body, rest, n_extra } = parse(&header, bytes, strict).map_err(error)?;
+    let mut warnings = Vec::new();
+    let textures = read_textures(&header, &body, path, budget, strict, &mut warnings)?;
+    let Body { mut mesh, faces, offset, non_finite_colors } = body;
+    let triangle_faces = faces.finish(&mut mesh, !textures.is_empty());
     let mut loaded = Loaded::of_mesh(path, mesh);
+    if !textures.is_empty() {
+        apply(textures, &mut loaded.description, &triangle_faces);
+    }
     loaded.description.offset = offset;
+    loaded.warnings = warnings;
     loaded.warnings.extend(colors::warning(path, non_finite_colors));
+    if n_extra > 0 {
+        loaded.warnings.push(format!(
+            "{}: {n_extra} rows have more values than the header says, which are left out",
+            path.display()
+        ));
+    }
     if header.format == Format::Ascii && !rest.trim_ascii().is_empty() {
         loaded.warnings.push(format!(
             "{}: text follows the rows that the header counts, and is left out",
@@ -140,9 +166,107 @@ pub(super) fn load(
     Ok(loaded)
 }
 
+/// The textures that a file names and has coordinates for.
+struct TextureSet {
+    images: Vec<Texture>,
+    /// The image of each name; `None` if it cannot be read.
+    of_name: Vec<Option<usize>>,
+}
+
+impl TextureSet {
+    fn is_empty(&self) -> bool {
+        self.images.is_empty()
+    }
+}
+
+/// Reads textures. One that cannot be read is left out with a warning, unless the load is strict.
+fn read_textures(
+    header: &Header,
+    body: &Body,
+    path: &Path,
+    budget: &Budget,
+    strict: bool,
+    warnings: &mut Vec<String>,
+) -> Result<TextureSet, LoadError> {
+    let has_uvs = !body.faces.uvs.is_empty() || !body.mesh.uvs.is_empty();
+    let mut textures = Textures::new(budget);
+    let mut of_name = Vec::new();
+    for (line, name) in header.textures.iter().filter(|_| has_uvs) {
+        let referrer = format!("{}, line {line}", path.display());
+        of_name.push(match textures.named_in(path, name, Content::Color, &referrer) {
+            Ok(index) => Some(index),
+            Err(error) if !strict && error.is_about_one_image() => {
+                warnings.push(format!("{error}; it is left out"));
+                None
+            }
+            Err(error) => return Err(error),
+        });
+    }
+    Ok(TextureSet { images: textures.loaded, of_name })
+}
+
+/// Gives each triangle the texture of its number, and divides the mesh by textures. Triangles of a texture that is not
+/// there are gray.
+fn apply(textures: TextureSet, description: &mut SceneDescription, triangle_textures: &[u32]) {
+    let TextureSet { images, of_name } = textures;
+    let image_of = |&number: &u32| of_name.get(number as usize).copied().flatten();
+    let Some(Part { name, mesh, .. }) = description.parts.pop() else { return };
+    description.materials.clear();
+    for image in (0..images.len()).map(Some).chain([None]) {
+        let triangles = mesh.triangles.iter().zip(triangle_textures);
+        let of_image = triangles.filter(|(_, number)| image_of(number) == image);
+        let triangles: Vec<_> = of_image.map(|(triangle, _)| *triangle).collect();
+        if triangles.is_empty() {
+            continue;
+        }
+        let material = description.materials.len();
+        description.materials.push(match image {
+            Some(image) => textured(image),
+            None => Material::diffuse("default", DEFAULT_ALBEDO),
+        });
+        description.parts.push(Part {
+            name: name.clone(),
+            mesh: of_triangles(&mesh, &triangles),
+            material,
+        });
+    }
+    description.textures = images;
+}
+
+/// The mesh of some triangles.
+fn of_triangles(mesh: &Mesh, triangles: &[[u32; 3]]) -> Mesh {
+    let mut known = HashMap::new();
+    let mut part = Mesh::default();
+    for triangle in triangles {
+        part.triangles.push(triangle.map(|vertex| {
+            *known.entry(vertex).or_insert_with(|| {
+                let at = vertex as usize;
+                part.positions.push(mesh.positions[at]);
+                part.normals.extend(mesh.normals.get(at));
+                part.uvs.extend(mesh.uvs.get(at));
+                (part.positions.len() - 1) as u32
+            })
+        }));
+    }
+    part
+}
+
+/// A diffuse material of the colors of an image.
+fn textured(image: usize) -> Material {
+    let model = PhongMaterial {
+        diffuse: Rgb::WHITE,
+        diffuse_texture: Some(TextureRef::new(image)),
+        specular: Rgb::BLACK,
+        exponent: 0.0,
+    };
+    Material::new("default", MaterialModel::Phong(model))
+}
+
 /// What the rows hold.
 struct Body {
+    /// The vertices.
     mesh: Mesh,
+    faces: Faces,
     /// What the positions are relative to.
     offset: DVec3,
     /// How many colors are NaN or infinite.
@@ -153,15 +277,20 @@ struct Parsed<'a> {
     body: Body,
     /// What follows the rows that the header counts.
     rest: &'a [u8],
+    /// The number of rows with more values than the header says.
+    n_extra: usize,
 }
 
 fn parse<'a>(header: &Header, bytes: &'a [u8], strict: bool) -> Located<Parsed<'a>> {
     let data = &bytes[header.length..];
     let start = header.length;
+    let mut n_extra = 0;
     let (body, position) = match header.format {
         Format::Ascii => {
-            let mut numbers = Ascii { data, position: 0, start };
-            (read_body(header, &mut numbers, strict)?, numbers.position)
+            let mut numbers = Ascii::new(data, start, header, strict);
+            let body = read_body(header, &mut numbers, strict)?;
+            n_extra = numbers.n_extra;
+            (body, numbers.position)
         }
         Format::Little => {
             let mut numbers = Binary::<false> { data, position: 0, start };
@@ -172,7 +301,7 @@ fn parse<'a>(header: &Header, bytes: &'a [u8], strict: bool) -> Located<Parsed<'
             (read_body(header, &mut numbers, strict)?, numbers.position)
         }
     };
-    Ok(Parsed { body, rest: &data[position..] })
+    Ok(Parsed { body, rest: &data[position..], n_extra })
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -249,6 +378,8 @@ struct Element {
 struct Header {
     format: Format,
     elements: Vec<Element>,
+    /// The names of textures, each with its line.
+    textures: Vec<(usize, String)>,
     /// In bytes, with the end of its last line.
     length: usize,
 }
@@ -256,6 +387,7 @@ struct Header {
 impl Header {
     fn parse(bytes: &[u8]) -> Located<Self> {
         let (mut format, mut elements, mut length) = (None, Vec::<Element>::new(), 0);
+        let mut textures = Vec::new();
         let end = line_end(bytes);
         for (index, line) in bytes.split_inclusive(|&b| b == end).enumerate() {
             length += line.len();
@@ -268,6 +400,10 @@ impl Header {
             match (words.as_slice(), elements.last_mut()) {
                 (["ply"], _) if index == 0 => {}
                 _ if index == 0 => return Err(wrong()),
+                (["comment", "TextureFile", _, ..], _) => {
+                    let name = text.split_once("TextureFile").map_or("", |(_, name)| name.trim());
+                    textures.push((index + 1, name.to_owned()));
+                }
                 ([] | ["comment" | "obj_info", ..], _) => {}
                 (["format", name, ..], _) => {
                     format = Some(match *name {
@@ -295,7 +431,7 @@ impl Header {
                 (["end_header"], _) => {
                     let format =
                         format.ok_or((PlyPlace::Line(index + 1), PlyErrorKind::NoFormat))?;
-                    return Ok(Self { format, elements, length });
+                    return Ok(Self { format, elements, textures, length });
                 }
                 // What is neither is a comment without its keyword, as Blender 2.47 wrote.
                 ([word, ..], _) if !["ply", "format", "element", "property"].contains(word) => {}
@@ -316,10 +452,12 @@ impl Header {
         let size = |element: &Element| match element.name.as_str() {
             // Position, normal, texture coordinate, color.
             "vertex" => element.count.saturating_mul(12 + 12 + 8 + 12),
-            // Where it ends, its indices, and two triangles; with a color, six vertices of their own.
+            // Where it ends, its indices, and two triangles; with a color or texture coordinates, six vertices of their own.
             "face" => {
                 let colors = if Colors::of(element).is_some() { 12 + 6 * 44 } else { 0 };
-                element.count.saturating_mul(8 + 4 * 4 + 2 * 12 + colors)
+                let has_uvs = element.properties.iter().any(is_corner_uvs);
+                let uvs = if has_uvs { 4 * 8 + 4 + 6 * 44 } else { 0 };
+                element.count.saturating_mul(8 + 4 * 4 + 2 * 12 + colors + uvs)
             }
             "tristrips" => {
                 let least = element.properties.iter().filter(|p| is_indices(p));
@@ -369,6 +507,9 @@ impl Header {
 /// The numbers of the body in order.
 trait Numbers: Clone {
     fn next(&mut self, scalar: Scalar) -> Located<f64>;
+
+    /// Passes over what the line of a row holds after its values, if rows are lines.
+    fn end_row(&mut self) -> Located<()>;
 }
 
 #[derive(Clone)]
@@ -376,9 +517,41 @@ struct Ascii<'a> {
     data: &'a [u8],
     position: usize,
     start: usize,
+    /// The byte that ends lines, if each row has one of its own.
+    row_end: Option<u8>,
+    /// The number of rows with more values than the header says.
+    n_extra: usize,
+    /// Whether there may be none.
+    strict: bool,
+}
+
+impl<'a> Ascii<'a> {
+    fn new(data: &'a [u8], start: usize, header: &Header, strict: bool) -> Self {
+        let end = line_end(data);
+        let lines = data.split(|&b| b == end).filter(|line| !line.trim_ascii().is_empty()).count();
+        let rows: u64 = header.elements.iter().map(|element| element.count).sum();
+        let row_end = (lines as u64 == rows).then_some(end);
+        Self { data, position: 0, start, row_end, n_extra: 0, strict }
+    }
 }
 
 impl Numbers for Ascii<'_> {
+    #[inline]
+    fn end_row(&mut self) -> Located<()> {
+        let Some(end) = self.row_end else { return Ok(()) };
+        let rest = &self.data[self.position..];
+        let length = rest.iter().position(|&b| b == end).unwrap_or(rest.len());
+        if !rest[..length].trim_ascii().is_empty() {
+            if self.strict {
+                let place = PlyPlace::Byte(self.start + self.position);
+                return Err((place, PlyErrorKind::ExtraValues));
+            }
+            self.n_extra += 1;
+        }
+        self.position += length;
+        Ok(())
+    }
+
     #[inline]
     fn next(&mut self, _: Scalar) -> Located<f64> {
         let rest = &self.data[self.position..];
@@ -424,6 +597,11 @@ impl<const BIG: bool> Binary<'_, BIG> {
 }
 
 impl<const BIG: bool> Numbers for Binary<'_, BIG> {
+    #[inline]
+    fn end_row(&mut self) -> Located<()> {
+        Ok(())
+    }
+
     #[inline]
     fn next(&mut self, scalar: Scalar) -> Located<f64> {
         Ok(match scalar {
@@ -476,7 +654,7 @@ fn read_body(header: &Header, numbers: &mut impl Numbers, strict: bool) -> Locat
         ));
     }
     let offset = offset.unwrap_or_default();
-    Ok(Body { mesh: faces.finish(mesh), offset, non_finite_colors })
+    Ok(Body { mesh, faces, offset, non_finite_colors })
 }
 
 /// What is read of a vertex, each with its names; the number is the slot in a row of values.
@@ -553,6 +731,7 @@ impl<'a> VertexRows<'a> {
                 _ => skip_property(property, numbers)?,
             }
         }
+        numbers.end_row()?;
         Ok(values)
     }
 
@@ -601,24 +780,50 @@ struct Faces {
     polygons: Polygons,
     /// One a polygon, or none.
     colors: Vec<Rgb>,
+    /// One a corner of the polygons, or none.
+    uvs: Vec<Vec2>,
+    /// The number of each polygon's texture; empty if the file does not say.
+    textures: Vec<u32>,
     /// Triangles of strips.
     strips: Vec<[u32; 3]>,
 }
 
 impl Faces {
-    fn finish(self, mut mesh: Mesh) -> Mesh {
-        let polygons = self.polygons.triangles(&mesh.positions);
-        mesh.triangles = polygons.iter().map(|(triangle, _)| *triangle).collect();
+    /// Adds the triangles to the vertices, with colors or else texture coordinates of faces, and returns the number of the
+    /// texture of each.
+    fn finish(self, mesh: &mut Mesh, is_textured: bool) -> Vec<u32> {
+        let polygons = self.polygons.corner_triangles(&mesh.positions);
+        mesh.triangles = polygons.iter().map(|(t, _)| self.polygons.vertices(*t)).collect();
         mesh.triangles.extend(&self.strips);
         if mesh.normals.is_empty() {
             mesh.compute_normals();
         }
-        if mesh.colors.is_empty() && !self.colors.is_empty() {
+        if is_textured {
+            mesh.colors.clear();
+            if !self.uvs.is_empty() {
+                let uvs = polygons.iter().map(|(t, _)| t.map(|corner| self.uvs[corner]));
+                let of_strips = self.strips.iter().map(|_| [Vec2::ZERO; 3]);
+                *mesh = map_corners(mesh, uvs.chain(of_strips));
+            }
+        } else if mesh.colors.is_empty() && !self.colors.is_empty() {
             let colors = polygons.iter().map(|&(_, face)| self.colors[face]);
-            mesh = color_triangles(&mesh, colors.chain(self.strips.iter().map(|_| DEFAULT_ALBEDO)));
+            let of_strips = self.strips.iter().map(|_| DEFAULT_ALBEDO);
+            *mesh = color_triangles(mesh, colors.chain(of_strips));
         }
-        mesh
+        let texture = |face: usize| self.textures.get(face).copied().unwrap_or(0);
+        let of_polygons = polygons.iter().map(|&(_, face)| texture(face));
+        of_polygons.chain(self.strips.iter().map(|_| 0)).collect()
     }
+}
+
+/// Texture coordinates of a face's corners.
+fn is_corner_uvs(p: &Property) -> bool {
+    p.list.is_some() && p.name == "texcoord"
+}
+
+/// The number of a face's texture.
+fn is_texture_number(p: &Property) -> bool {
+    p.list.is_none() && p.name == "texnumber"
 }
 
 fn is_indices(p: &Property) -> bool {
@@ -653,8 +858,13 @@ fn read_faces(
 ) -> Located<usize> {
     require_indices(element)?;
     let colors = Colors::of(element);
+    let has_uvs = element.properties.iter().any(is_corner_uvs);
+    let has_numbers = element.properties.iter().any(is_texture_number);
+    let mut uvs = Vec::new();
     for row in 0..element.count as usize {
         let mut rgb = [0.0; 3];
+        let mut texture = 0;
+        uvs.clear();
         for property in &element.properties {
             let color = slot_of(property).and_then(|slot| slot.checked_sub(Colors::RED));
             if is_indices(property) {
@@ -662,14 +872,33 @@ fn read_faces(
                     let value = numbers.next(property.scalar)?;
                     out.polygons.push(index(value, vertices, element, row)?);
                 }
+            } else if is_corner_uvs(property) {
+                for _ in 0..list_length(property, numbers, &element.name, row)? {
+                    uvs.push(numbers.next(property.scalar)? as f32);
+                }
+            } else if is_texture_number(property) {
+                let number = numbers.next(property.scalar)?;
+                texture = if number >= 0.0 { number as u32 } else { u32::MAX };
             } else if let Some(channel) = color {
                 rgb[channel] = numbers.next(property.scalar)? as f32;
             } else {
                 skip_property(property, numbers)?;
             }
         }
+        numbers.end_row()?;
         out.polygons.end();
         out.colors.extend(colors.map(|_| Rgb::from(rgb)));
+        if has_uvs {
+            // A corner without a pair of numbers is at the origin of the texture.
+            let origin = Vec2::new(0.0, 1.0);
+            let uv = |&[u, v]: &[f32; 2]| Vec2::new(u, 1.0 - v);
+            let pairs = uvs.as_chunks().0.iter().map(uv);
+            out.uvs.extend(pairs.map(|uv| if uv.is_finite() { uv } else { origin }));
+            out.uvs.resize(out.polygons.n_corners(), origin);
+        }
+        if has_numbers {
+            out.textures.push(texture);
+        }
     }
     Ok(colors.map_or(0, |colors| colors.linearize(&mut out.colors)))
 }
@@ -705,6 +934,7 @@ fn read_strips(
                 (before, n) = ([b, corner], n + 1);
             }
         }
+        numbers.end_row()?;
     }
     Ok(())
 }
@@ -735,6 +965,7 @@ fn skip(element: &Element, numbers: &mut impl Numbers) -> Located<()> {
         for property in &element.properties {
             skip_property(property, numbers)?;
         }
+        numbers.end_row()?;
     }
     Ok(())
 }

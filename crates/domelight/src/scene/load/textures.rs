@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits};
 
-use super::{Budget, LoadError, read_referenced};
+use super::{Budget, LoadError, last_part, read_referenced, relative};
 use crate::picture;
 use crate::scene::texture::{Encoding, Texture};
 
@@ -59,6 +59,26 @@ impl<'b> Textures<'b> {
         self.loaded.push(texture);
         self.files.insert(key, self.loaded.len() - 1);
         Ok(self.loaded.len() - 1)
+    }
+
+    /// The index of the texture that the file `from` names: where it says, or else, if the name is a path of the computer
+    /// where the file was made, its last part beside `from`.
+    pub(super) fn named_in(
+        &mut self,
+        from: &Path,
+        name: &str,
+        content: Content,
+        referrer: &str,
+    ) -> Result<usize, LoadError> {
+        let path = relative(from, name);
+        self.file_of(&path, content, referrer).or_else(|error| {
+            match (&error, relative(from, last_part(name))) {
+                (LoadError::ReadReferenced { .. }, beside) if beside != path => {
+                    self.file_of(&beside, content, referrer).map_err(|_| error)
+                }
+                _ => Err(error),
+            }
+        })
     }
 
     /// The index of a new texture with the green of one and the blue of another, as large as the larger one, and 1 for what
