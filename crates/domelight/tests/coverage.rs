@@ -277,13 +277,29 @@ fn pane(color: Rgb, transmission: f32, opacity: f32) -> Material {
 /// the mean of their channels.
 #[test]
 fn panes_tint_what_is_behind_them_by_every_strategy() {
-    let (clear, milky) = (Rgb::new(1.0, 0.5, 0.25), Rgb::new(0.8, 0.8, 0.4));
+    check_panes(Rgb::new(1.0, 0.5, 0.25), Rgb::new(0.8, 0.8, 0.4), 0.6);
+}
+
+/// Dark panes, which camera rays hit as often as they reflect beside what they let through.
+#[test]
+fn dark_panes_tint_what_is_behind_them_by_every_strategy() {
+    check_panes(Rgb::new(0.9, 0.9, 0.6), Rgb::new(0.03, 0.02, 0.05), 1.0);
+}
+
+/// A card behind a pane that lets a color pass and one that lets half of another pass where it is, and reflects the
+/// other half.
+fn check_panes(clear: Rgb, milky: Rgb, opacity: f32) {
     let scene = stack(
-        vec![pane(clear, 1.0, 1.0), pane(milky, 0.5, 0.6), covering(AlphaMode::Opaque, 1.0, 0.7)],
+        vec![
+            pane(clear, 1.0, 1.0),
+            pane(milky, 0.5, opacity),
+            covering(AlphaMode::Opaque, 1.0, 0.7),
+        ],
         Vec::new(),
     );
-    let through = Rgb::splat(0.4) + milky * 0.3;
-    let milk = clear * clear.mean() * milky * 0.3;
+    let half = 0.5 * opacity;
+    let through = Rgb::splat(1.0 - opacity) + milky * half;
+    let milk = clear * clear.mean() * milky * half;
     let card = clear * through * (0.7 * clear.mean() * through.mean());
     let expected = (milk + card).to_array().map(f64::from);
     let white = stack(vec![Material::diffuse("white", Rgb::WHITE)], Vec::new());
@@ -293,6 +309,54 @@ fn panes_tint_what_is_behind_them_by_every_strategy() {
     let of_white: Vec<_> =
         of_white.iter().map(|m| std::array::from_fn(|c| m[c] * expected[c])).collect();
     check_every_strategy(&scene, &environment, &of_white);
+}
+
+/// A ball of dark glass, which lets little through, or of the same glossy black without any transmission.
+fn dark_ball(transmission: Option<f32>) -> Scene {
+    let model = MaterialModel::MetallicRoughness(MetallicRoughnessMaterial {
+        base_color: Rgb::splat(if transmission.is_some() { 0.02 } else { 0.0 }),
+        base_color_texture: None,
+        metallic: 0.0,
+        roughness: 0.2,
+        metallic_roughness_texture: None,
+    });
+    let transmission = transmission.map(|value| Factor { value, texture: None });
+    let glass = Material {
+        double_sided: false,
+        layers: MaterialLayers { transmission, ..MaterialLayers::default() },
+        ..Material::new("glass", model)
+    };
+    let parts = vec![Part { name: "ball".into(), mesh: shapes::icosphere(3), material: 0 }];
+    let description =
+        SceneDescription { parts, materials: vec![glass], ..SceneDescription::default() };
+    Scene::new(description).unwrap()
+}
+
+/// What little is seen through dark glass adds little noise to what the glass reflects.
+#[test]
+fn dark_glass_is_about_as_quiet_as_its_coat() {
+    let environment = lamp();
+    for name in ["mis:2:2", "product:2"] {
+        let strategy = PreparedStrategy::new(name.parse().unwrap(), &environment).unwrap();
+        let variance = |scene: &Scene| {
+            let picture = |seed| {
+                let background = Background::Shown;
+                let settings = RenderSettings { seed, background, n_samples: 8, ..settings() };
+                draw_from(vec3(4.0, 2.0, 1.0), scene, &environment, &strategy, &settings).color
+            };
+            let pictures: Vec<_> = (0..48).map(picture).collect();
+            let n = pictures.len() as f64;
+            let of_pixel = |i: usize| {
+                let values = pictures.iter().map(|p| f64::from(p.pixels[i].luminance()));
+                let mean = values.clone().sum::<f64>() / n;
+                values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)
+            };
+            (0..pictures[0].pixels.len()).map(of_pixel).sum::<f64>()
+        };
+        let [glass, coat] =
+            [Some(1.0), None].map(|transmission| variance(&dark_ball(transmission)));
+        assert!(glass <= 2.0 * coat, "{name}: {glass:e} for {coat:e}");
+    }
 }
 
 /// Behind panes, a bright map is seen tinted, and what hides it is counted in alpha.

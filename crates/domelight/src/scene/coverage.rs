@@ -5,9 +5,10 @@
 //!
 //! A camera ray hits a surface with a probability equal to its coverage. Each triangle along the ray has its own random
 //! number, so that the transmittances of several layers multiply. A covered point of a transmissive surface is hit with
-//! probability p = max(1 − max(T), ¼); the sample's weight is 1/p if the surface is hit, and T/(1 − p) if not. A shadow
-//! ray multiplies the transmittances of all surfaces along it, without noise, using the mean of T's channels at normal
-//! incidence.
+//! probability p = max(r/(r + t), ¼), where r is about what it reflects and emits and t the luminance of T; the sample's
+//! weight is 1/p if the surface is hit, and T/(1 − p) if not. So a surface before even surroundings contributes the same
+//! to a sample that hits it as to one that passes. A shadow ray multiplies the transmittances of all surfaces along it,
+//! without noise, using the mean of T's channels at normal incidence.
 //!
 //! A single-sided surface is invisible to a camera ray that comes from behind, so that a closed body is hit once. It
 //! casts a shadow from either side, but T also counts only once per body for light: where light reaches the front,
@@ -17,6 +18,7 @@
 use std::cell::RefCell;
 
 use super::corners::Corners;
+use super::material::LightShares;
 use super::texture::Uvs;
 use super::{AlphaMode, Coverage, Material, Part, Scene};
 use crate::Rgb;
@@ -318,9 +320,10 @@ impl Scene {
         }
         let normal = part.mesh.area_normal(triangle).normalize_or_zero();
         let cos_theta = normal.dot(ray.direction.normalize()).abs();
-        let body = self.transmittance(part, triangle, hit, cos_theta);
-        let through = Rgb::splat(1.0 - coverage) + body * coverage;
-        let probability = (1.0 - through.max_component()).max(LEAST_REFLECTED * coverage);
+        let LightShares { transmitted, reflected } = self.shares(part, triangle, hit, cos_theta);
+        let through = Rgb::splat(1.0 - coverage) + transmitted * coverage;
+        let emitted = material.emission.as_ref().map_or(0.0, |e| e.radiance.luminance());
+        let probability = meeting_probability(reflected + emitted, coverage, through);
         Layer {
             transmits: true,
             probability,
@@ -329,12 +332,12 @@ impl Scene {
         }
     }
 
-    /// The transmittance T of a surface at a hit, per channel, where the surface exists.
-    fn transmittance(&self, part: &Part, triangle: usize, hit: &Hit, cos_theta: f32) -> Rgb {
+    /// What becomes of light at a hit, where the surface exists.
+    fn shares(&self, part: &Part, triangle: usize, hit: &Hit, cos_theta: f32) -> LightShares {
         let corners = Corners::new(&part.mesh, triangle, hit);
         let tint = corners.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
         let uvs = corners.uvs(&part.mesh);
-        self.materials[part.material].transmittance(&self.textures, &uvs, tint, cos_theta)
+        self.materials[part.material].shares(&self.textures, &uvs, tint, cos_theta)
     }
 
     /// The mean share of light that a surface that transmits lets through to a shadow ray in `direction`, where it is
@@ -347,7 +350,7 @@ impl Scene {
         hit: &Hit,
         direction: Vec3,
     ) -> f32 {
-        let through = self.transmittance(part, triangle, hit, 1.0).mean();
+        let through = self.shares(part, triangle, hit, 1.0).transmitted.mean();
         let is_front = || part.mesh.area_normal(triangle).dot(direction) > 0.0;
         if self.materials[part.material].double_sided || through <= 0.0 || is_front() {
             through
@@ -441,6 +444,16 @@ impl Scene {
         };
         part.mesh.area_normal(triangle).dot(direction) <= 0.0
     }
+}
+
+/// The probability that a camera ray hits a transmissive surface of some coverage: the share of what the surface
+/// contributes, its coverage times `contribution`, in all that is seen, under even light.
+fn meeting_probability(contribution: f32, coverage: f32, through: Rgb) -> f32 {
+    let (met, passed) = (coverage * contribution, through.luminance());
+    if passed <= 0.0 {
+        return 1.0;
+    }
+    (met / (met + passed)).max(LEAST_REFLECTED * coverage)
 }
 
 /// The ray as far as what it hits.

@@ -12,6 +12,22 @@ use crate::math::Vec3;
 /// The reflectance of shadow catchers, on which shadows do not depend.
 pub(crate) const CATCHER_REFLECTANCE: f32 = 0.5;
 
+/// The reflectance of a clear coat at normal incidence.
+const COAT_F0: f32 = 0.04;
+
+/// What becomes of the light that a surface meets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LightShares {
+    /// The share of each channel that passes straight through.
+    pub(crate) transmitted: Rgb,
+    /// About the share of all light that is reflected, in \[0, 1\].
+    pub(crate) reflected: f32,
+}
+
+impl LightShares {
+    const OPAQUE: Self = Self { transmitted: Rgb::BLACK, reflected: 1.0 };
+}
+
 /// The material of a part of a scene.
 #[derive(Clone, Debug)]
 pub struct Material {
@@ -139,18 +155,18 @@ impl Material {
             && matches!(self.model, MaterialModel::MetallicRoughness(_))
     }
 
-    /// The share of each channel that passes straight through the surface at texture coordinates `uvs` under the vertex
-    /// color `tint`, along a direction at the cosine `cos_theta` to its normal. A body does not refract.
-    pub(crate) fn transmittance(
+    /// What becomes of light at texture coordinates `uvs` under the vertex color `tint`, along a direction at the cosine
+    /// `cos_theta` to the normal. A body does not refract.
+    pub(crate) fn shares(
         &self,
         textures: &[Texture],
         uvs: &Uvs,
         tint: Rgb,
         cos_theta: f32,
-    ) -> Rgb {
-        let MaterialModel::MetallicRoughness(m) = &self.model else { return Rgb::BLACK };
+    ) -> LightShares {
+        let MaterialModel::MetallicRoughness(m) = &self.model else { return LightShares::OPAQUE };
         let Some(transmission) = self.layers.transmission.filter(|_| !self.unlit) else {
-            return Rgb::BLACK;
+            return LightShares::OPAQUE;
         };
         let look_up =
             |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uvs));
@@ -163,12 +179,20 @@ impl Material {
             .as_ref()
             .map_or(1.0, |specular| unit(specular.strength.at(Channel::Alpha, textures, uvs)));
         let entering = 1.0 - strength * Fresnel::Schlick { f0 }.eval(cos_theta).r;
-        let share = unit(transmission.at(Channel::Red, textures, uvs)) * dielectric * entering;
+        let transmission = unit(transmission.at(Channel::Red, textures, uvs));
+        let share = transmission * dielectric * entering;
         let body =
             self.layers.volume.as_ref().map_or(Rgb::WHITE, |volume| {
                 volume.transmittance(textures, uvs, self.double_sided)
             });
-        base * body * share
+        // Dielectrics reflect by Fresnel's equations and diffusely what is not transmitted, metals by their color.
+        let diffuse = entering * (1.0 - transmission) * dielectric + (1.0 - dielectric);
+        let below = (1.0 - entering) * dielectric + base.luminance() * diffuse;
+        let coat = self.layers.clearcoat.as_ref().map_or(0.0, |coat| {
+            let fresnel = Fresnel::Schlick { f0: Rgb::splat(COAT_F0) }.eval(cos_theta).r;
+            unit(coat.strength.at(Channel::Red, textures, uvs)) * fresnel
+        });
+        LightShares { transmitted: base * body * share, reflected: coat + (1.0 - coat) * below }
     }
 
     /// The textures that the material refers to.
