@@ -10,6 +10,7 @@ mod bench;
 mod clock;
 mod command_line;
 mod compare;
+mod conventions;
 mod diff;
 mod error;
 mod exit;
@@ -62,6 +63,7 @@ fn main() -> ExitCode {
         Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Ibl(arguments) => ibl::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
+        Command::Conventions(arguments) => conventions::run(&arguments),
         Command::Schema => output::print_json(&domelight_lab::job::schema()),
         Command::Tone(arguments) => tone::run(&arguments, quiet),
         Command::Figures(arguments) => figures::run(&arguments, quiet),

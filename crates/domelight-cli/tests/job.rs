@@ -148,3 +148,29 @@ fn the_schema_describes_jobs() {
         assert!(text.contains(word), "{word}");
     }
 }
+
+/// A map that is turned for a program and then taken in that program's convention is the map itself.
+#[test]
+fn conventions_of_programs_undo_each_other() {
+    let folder = folder();
+    done(&domelight(&folder, &["conventions", "--size", "32", "-o", "axes.exr"]));
+    let render = |map: &str, more: &[&str]| {
+        // The background alone has no noise.
+        let scene = ["render", "sphere", "--env", map, "--origin", "0,0,9", "--target", "0,1,20"];
+        let how = ["--fov", "90", "--size", "16x16", "--spp", "1", "-q", "-o", "x.pfm"];
+        done(&domelight(&folder, &[&scene[..], &how, more].concat()));
+        pixels(&folder, "x.pfm")
+    };
+    let here = render("axes.exr", &[]);
+    for program in ["pbrt", "three", "godot"] {
+        let turned = ["probe", "axes.exr", "--for", program, "-q", "-o", "there.exr"];
+        done(&domelight(&folder, &turned));
+        assert_ne!(render("there.exr", &[]), here, "{program}");
+        let back = render("there.exr", &["--env-convention", program]);
+        let error = |(a, b): (&Rgb, &Rgb)| (a.g - b.g).abs() / b.g;
+        let most = back.iter().zip(&here).map(error).fold(0.0, f32::max);
+        assert!(most < 1e-4, "{program}: {most}");
+    }
+    let quarter = ["probe", "axes.exr", "--for", "three", "--size", "31", "-o", "there.exr"];
+    ended(&domelight(&folder, &quarter), 2, &["--for three", "4"]);
+}

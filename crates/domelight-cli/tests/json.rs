@@ -6,7 +6,7 @@ use std::fs;
 use tempfile::TempDir;
 
 /// Small runs of every command, in an order in which each finds the files of those before.
-const RUNS: [(&str, &[&str]); 14] = [
+const RUNS: [(&str, &[&str]); 15] = [
     (
         "render",
         &[
@@ -76,6 +76,7 @@ const RUNS: [(&str, &[&str]); 14] = [
     ("ibl", &["sky", "--env-rows", "16", "--size", "4", "-o", "cube.ktx2"]),
     ("probe", &["sky", "--size", "32"]),
     ("figures", &["--quick", "--env-rows", "24", "--scene", "sphere", "--only", "1"]),
+    ("conventions", &[]),
     ("completions", &["bash"]),
     ("man", &["pages"]),
 ];

@@ -15,9 +15,11 @@ use crate::memory::MaxMemory;
 use crate::output::PicturePath;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Arg, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
+use domelight::environment::convention::Convention;
 use domelight::environment::mapping::Mapping;
 use domelight::picture::tone::ToneCurve;
 use domelight_lab::job::Tone;
+use domelight_lab::job::value::{Choice, Count};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -125,6 +127,9 @@ pub(crate) enum Command {
     /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
     #[command(after_help = figures::EXAMPLES)]
     Figures(Box<figures::FiguresArguments>),
+    /// List how other programs hang a lat-long map in their world, or write a map that shows it.
+    #[command(after_help = CONVENTIONS_EXAMPLES)]
+    Conventions(ConventionsArguments),
     /// Print the JSON Schema of jobs: of scene files that say how to render, and of what a picture says of itself.
     #[command(after_help = SCHEMA_EXAMPLES)]
     Schema,
@@ -134,6 +139,32 @@ pub(crate) enum Command {
     /// Write manual pages: domelight.1 and one for each command.
     #[command(after_help = MAN_EXAMPLES)]
     Man(ManArguments),
+}
+
+const CONVENTIONS_EXAMPLES: &str = "\
+Examples:
+  domelight conventions
+      the direction of the center of a map in Blender, Mitsuba, three.js, …
+  domelight conventions -o axes.exr
+      a map with the axes' names, to load in a program and look at
+  domelight render scene.glb --env studio.hdr --env-convention blender
+      a scene from Blender under its world, turned as there
+  domelight probe studio.hdr --for three -o studio-three.hdr
+      a map that stands in three.js as it stands here";
+
+/// List how other programs hang a map.
+#[derive(Args, Debug)]
+pub(crate) struct ConventionsArguments {
+    /// Write a map that shows how it hangs: a dot in each of 26 directions, the names of the axes as they read from
+    /// inside, and a sun of one texel (.exr, .hdr, .pfm, .png; - writes OpenEXR to standard output)
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PicturePath>,
+    /// Rows of that map
+    #[arg(long, value_name = "H", default_value = "512", requires = "output")]
+    pub(crate) size: Count<16, 8192>,
+    /// Print the list as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 const SCHEMA_EXAMPLES: &str = "\
@@ -301,6 +332,9 @@ pub(crate) struct ProbeArguments {
     /// Mapping of the output file.
     #[arg(long, value_name = "MAPPING", requires = "output", default_value_t = Mapping::LatLong, value_parser = mapping())]
     pub(crate) to: Mapping,
+    /// Turn the lat-long output so that it stands in PROGRAM as it stands here (domelight conventions lists programs).
+    #[arg(long = "for", id = "for_program", value_name = "PROGRAM", requires = "output")]
+    pub(crate) for_program: Option<Choice<Convention>>,
     /// Write the probe (.exr, .hdr, .pfm, .png; - writes OpenEXR to standard output).
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PicturePath>,

@@ -4,7 +4,7 @@ mod sheet;
 
 use crate::args::PreviewPng;
 use crate::args::ProbeArguments;
-use crate::error::{status, warn};
+use crate::error::{UsageError, status, warn};
 use crate::files;
 use crate::memory;
 use crate::output::{
@@ -12,11 +12,13 @@ use crate::output::{
 };
 use domelight::environment::Environment;
 use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::convention::Convention;
 use domelight::environment::io::{Guess, LoadedProbe, ProbeOptions, SanitizeReport, load_probe};
 use domelight::environment::mapping::{Mapping, from_lat_long, to_lat_long};
 use domelight::environment::statistics::{ProbeStatistics, Sun};
 use domelight::picture::exposure::Exposure;
 use domelight::{Rgb, RgbImage};
+use domelight_lab::job::value::Choice;
 use domelight_lab::probe::{RAYS_A_PIXEL, StrategyNoise, strategy_noise};
 use sheet::Sheet;
 use std::fmt::Write;
@@ -142,12 +144,19 @@ fn convert(
     output: &PicturePath,
     quiet: bool,
 ) -> anyhow::Result<()> {
+    if arguments.for_program.is_some() && arguments.to != Mapping::LatLong {
+        let text = format!("--for writes a lat-long map, and --to asks for {}", arguments.to);
+        return Err(UsageError(text).into());
+    }
     let rows = arguments.size.map_or(map.height, |size| size as usize);
     memory::keep(12 * map.pixels.len() as u64);
     let what = format!("{} with {rows} rows", arguments.probe.display());
     memory::allow(&what, (12 + memory::WRITTEN_TEXEL) * 2 * (rows as u64).pow(2))?;
     let resized = (rows != map.height).then(|| to_lat_long(map, Mapping::LatLong, rows));
     let map = resized.as_ref().unwrap_or(map);
+    let turned = arguments.for_program.map(|Choice(convention)| turned_for(convention, map));
+    let turned = turned.transpose()?;
+    let map = turned.as_ref().unwrap_or(map);
     let tone = arguments.tone.of_picture(|| Exposure::Auto.stops(map, None));
     let mapping = arguments.to;
     let size = match mapping {
@@ -169,6 +178,12 @@ fn convert(
         ));
     }
     Ok(())
+}
+
+/// The map as a program takes it.
+fn turned_for(convention: Convention, map: &RgbImage) -> Result<RgbImage, UsageError> {
+    let turned = convention.for_program(map);
+    turned.map_err(|error| UsageError(format!("--for {convention}: {error}; see --size")))
 }
 
 fn table(measured: &MeasuredProbe) -> String {

@@ -6,6 +6,7 @@ use std::str::FromStr as _;
 use clap::Args;
 use domelight::RgbImage;
 use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::convention::Convention;
 use domelight::environment::io::{ProbeError, ProbeOptions};
 use domelight::environment::mapping::Mapping;
 use domelight::environment::{Environment, UpAxis};
@@ -27,6 +28,10 @@ pub struct Light {
     /// - reads standard input) [default: the scene's, otherwise sky]
     #[arg(id = "light.map", long = "env", value_name = "PROBE")]
     pub map: Option<String>,
+    /// Program whose world the scene comes from: the map stands as it does there (domelight conventions lists what that
+    /// means) [default: -Z, or +Y with the map's top toward +Z, sees the center of the map]
+    #[arg(id = "light.convention", long = "env-convention", value_name = "PROGRAM")]
+    pub convention: Option<Choice<Convention>>,
     /// Rotate the environment about the up axis, counterclockwise as seen from above [degrees]; with a
     /// camera, auto puts its sun or brightest side to the left of it
     #[arg(id = "light.rotate", long = "env-rotate", value_name = "DEG|auto")]
@@ -84,7 +89,8 @@ impl Light {
             (None, None) => plain(source(BuiltinProbe::Sky.name())),
         };
         let rotate = self.rotate.and_then(|Text(rotate)| rotate.degrees());
-        settings.rotate_degrees = rotate.unwrap_or(settings.rotate_degrees);
+        let turn = self.convention.map_or(0.0, |Choice(convention)| convention.rotation());
+        settings.rotate_degrees = rotate.unwrap_or(settings.rotate_degrees) + turn;
         settings.scale = self.scale.map_or(settings.scale, NotNegative::get);
         settings.exposure = self.exposure.map_or(settings.exposure, Finite::get);
         settings.up = self.up.map_or(settings.up, |Choice(up)| up);
@@ -111,7 +117,7 @@ impl Light {
                 let rows = u64::from(self.rows.get());
                 let bytes = Environment::MEMORY_PER_TEXEL * 2 * rows * rows;
                 host.take_memory(&format!("{name} with {rows} rows"), bytes)?;
-                return Ok(probe.image(self.rows.get() as usize));
+                return Ok(self.in_convention(probe.image(self.rows.get() as usize)));
             }
             EnvironmentSource::File(path) => path,
         };
@@ -127,7 +133,15 @@ impl Light {
         let texels = loaded.image.pixels.len() as u64;
         host.take_memory(&path.display().to_string(), Environment::MEMORY_PER_TEXEL * texels)?;
         loaded.warnings.iter().for_each(|warning| host.warn(warning));
-        Ok(loaded.image)
+        Ok(self.in_convention(loaded.image))
+    }
+
+    /// The map as it is taken, if it comes from another program.
+    fn in_convention(&self, map: RgbImage) -> RgbImage {
+        match self.convention {
+            Some(Choice(convention)) => convention.from_program(map),
+            None => map,
+        }
     }
 }
 

@@ -357,12 +357,13 @@ mod tests {
     }
 
     /// Values of every option, by the path of its field.
-    const VALUES: [(&str, &[&str]); 33] = [
+    const VALUES: [(&str, &[&str]); 34] = [
         ("scene", &["robot.glb", "a b.ply", "-x.obj", "statue"]),
         ("file.scene", &["Scene", "0"]),
         ("file.animation", &["walk", "1"]),
         ("file.at", &["0.1", "-3", "1e-3"]),
         ("light.map", &["sky", "it's.hdr", "-"]),
+        ("light.convention", &["blender", "pbrt"]),
         ("light.rotate", &["auto", "30", "-0.1", "360.5"]),
         ("light.scale", &["0", "0.25"]),
         ("light.exposure", &["-1.5", "2"]),

@@ -10,6 +10,7 @@ use clap::builder::{
     MapValueParser, PossibleValue, PossibleValuesParser, TypedValueParser as _, ValueParserFactory,
 };
 use domelight::environment::UpAxis;
+use domelight::environment::convention::Convention;
 use domelight::environment::mapping::Mapping;
 use domelight::math::DVec3;
 use domelight::picture::tone::ToneCurve;
@@ -522,6 +523,16 @@ impl Named for Filter {
 }
 
 impl Named for Mapping {
+    fn all() -> Vec<Self> {
+        Self::ALL.to_vec()
+    }
+
+    fn name(self) -> &'static str {
+        self.name()
+    }
+}
+
+impl Named for Convention {
     fn all() -> Vec<Self> {
         Self::ALL.to_vec()
     }

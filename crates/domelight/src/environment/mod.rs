@@ -8,6 +8,7 @@
 pub mod builtin;
 pub(crate) mod compact;
 mod compensation;
+pub mod convention;
 mod density;
 #[cfg(feature = "io")]
 mod guess;
