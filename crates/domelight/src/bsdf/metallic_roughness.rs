@@ -1,14 +1,18 @@
 //! The metallic-roughness model of glTF 2.0 (specification, appendix B).
 //!
-//! f_r = (1 − F) c_diff/π + F D G₂/(4 cos θ_i cos θ_o) with F by Schlick at h·wo,
-//! c_diff = (1 − metallic) · base, f0 = lerp(0.04, base, metallic), and D and G₂ those of GGX with
-//! correlated masking and α = roughness². The diffuse part depends on the half vector, so the two
-//! parts are one lobe rather than a sum of two. It is sampled as a mixture whose proportions follow the
-//! Fresnel reflectance at `wo`.
+//! A dielectric, (1 − F) base/π + F D G₂/(4 cos θ_i cos θ_o) with f0 = 0.04, and a metal,
+//! F D G₂/(4 cos θ_i cos θ_o) with f0 = base, are mixed by `metallic` (appendix B.3.5), F by Schlick at h·wo, and D and
+//! G₂ those of GGX with correlated masking and α = roughness². The two specular parts are one with
+//! f0 = lerp(0.04, base, metallic), while the diffuse part loses only what the dielectric reflects:
+//! (1 − metallic) (1 − F_dielectric) base/π. It depends on the half vector, so the two parts are one lobe rather than a
+//! sum of two. It is sampled as a mixture whose proportions follow the Fresnel reflectance at `wo`.
 //!
-//! `KHR_materials_specular` gives the dielectric a strength w and a color: F goes from
-//! f0 = lerp(w min(f0 color, 1), base, metallic) to f90 = lerp(w, 1, metallic), and the diffuse part keeps 1 − max F,
-//! so that it does not take on the complementary color. `KHR_materials_anisotropy` makes the lobe rougher along x.
+//! `KHR_materials_specular` gives the dielectric a strength w and a color: its F goes from w min(f0 color, 1) to w, and
+//! the diffuse part keeps 1 − max F, so that it does not take on the complementary color. `KHR_materials_anisotropy`
+//! makes the lobe rougher along x.
+//!
+//! What the diffuse part keeps, 1 − f0 − (f90 − f0) (1 − h·wo)⁵ of the dielectric, is 1 − f0 times
+//! 1 − (1 − `kept`) (1 − h·wo)⁵, where `kept` = (1 − f90)/(1 − f0).
 //!
 //! This is the specification's formula, so that materials look as in other glTF viewers. It does not
 //! conserve energy: over all directions of light, half vectors are less oblique than the view, so
@@ -26,13 +30,14 @@ use crate::simd::{Colors, LaneMask as _, SimdFloat, Vectors};
 /// glTF's metallic-roughness lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetallicRoughness {
+    /// The diffuse part's albedo where light and view coincide.
     diffuse: Rgb,
+    /// The fraction of `diffuse` left at grazing incidence, in \[0, 1\].
+    kept: f32,
     f0: Rgb,
     /// At least as large as any channel of `f0`.
     f90: f32,
     alpha: [f32; 2],
-    /// Whether the diffuse part loses the largest channel of F from every channel.
-    keeps_hue: bool,
 }
 
 impl MetallicRoughness {
@@ -45,8 +50,7 @@ impl MetallicRoughness {
     /// The same with a refractive index of the dielectric other than 1.5 (`KHR_materials_ior`): `f0` is its reflectance
     /// at normal incidence, ((ior − 1) / (ior + 1))², clamped to \[0, 1\].
     pub fn with_dielectric(base_color: Rgb, metallic: f32, roughness: f32, f0: f32) -> Self {
-        let specular = Self::with_specular(base_color, metallic, roughness, Rgb::splat(f0), 1.0);
-        Self { keeps_hue: false, ..specular }
+        Self::with_specular(base_color, metallic, roughness, Rgb::splat(f0), 1.0)
     }
 
     /// The same with a strength and color of the dielectric reflection (`KHR_materials_specular`): `f0` is the
@@ -61,12 +65,15 @@ impl MetallicRoughness {
     ) -> Self {
         let (base, metallic) = (range::reflectance(base_color), range::unit(metallic));
         let strength = range::unit(strength);
+        let dielectric = range::reflectance(f0) * strength;
+        let entering = 1.0 - dielectric.max_component();
         Self {
-            diffuse: base * (1.0 - metallic),
-            f0: (range::reflectance(f0) * strength).lerp(base, metallic),
+            diffuse: base * (1.0 - metallic) * entering,
+            // Nothing enters a perfect reflector.
+            kept: if entering > 0.0 { range::unit((1.0 - strength) / entering) } else { 0.0 },
+            f0: dielectric.lerp(base, metallic),
             f90: strength + (1.0 - strength) * metallic,
             alpha: range::alpha([sqr(range::unit(roughness)); 2]),
-            keeps_hue: true,
         }
         .ordered()
     }
@@ -99,7 +106,7 @@ impl MetallicRoughness {
     pub fn specular_glossiness(diffuse: Rgb, specular: Rgb, glossiness: f32) -> Self {
         let unit = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
         let f0 = specular.map(unit);
-        let diffuse = diffuse.map(unit) * (1.0 - f0.max_component());
+        let diffuse = diffuse.map(unit) * (1.0 - f0.max_component()) * (Rgb::WHITE - f0);
         let of_roughness = Self::new(Rgb::BLACK, 0.0, 1.0 - unit(glossiness));
         Self { diffuse, f0, ..of_roughness }
     }
@@ -114,11 +121,10 @@ impl MetallicRoughness {
         Ggx::new(self.alpha, Fresnel::Schlick { f0 }, Masking::Correlated)
     }
 
-    /// The fraction that the diffuse part loses to reflection `f`.
+    /// The fraction of `diffuse` left where light and view meet the half vector at the cosine `cos_d`.
     #[inline(always)]
-    fn lost<F: SimdFloat>(&self, f: Colors<F>) -> Colors<F> {
-        let Colors([r, g, b]) = f;
-        if self.keeps_hue { Colors([r.max(g).max(b); 3]) } else { f }
+    fn kept_at<F: SimdFloat>(&self, cos_d: F) -> F {
+        cos_d.splat(1.0) - cos_d.splat(1.0 - self.kept) * fresnel::schlick_weight(cos_d)
     }
 
     /// The probability of sampling the specular part: at most [`MOST_SPECULAR`] if there is a diffuse part, whose weights would
@@ -129,7 +135,7 @@ impl MetallicRoughness {
         let grazing = fresnel::schlick_weight(cos_theta_o);
         let (diffuse_mean, f0_mean) = (self.diffuse.mean(), self.f0.mean());
         let specular = one(f0_mean) + one(self.f90 - f0_mean) * grazing;
-        let diffuse = (one(1.0) - specular) * one(diffuse_mean);
+        let diffuse = self.kept_at(cos_theta_o) * one(diffuse_mean);
         // At most this, and where nothing is specular: all of a black metal, which has no diffuse part.
         let [most, none] = if diffuse_mean > 0.0 { [MOST_SPECULAR, 0.0] } else { [1.0, 1.0] };
         let share = F::select(one(0.0).lt(specular), specular / (specular + diffuse), one(none));
@@ -151,8 +157,7 @@ impl Brdf for MetallicRoughness {
         let cos_d = one(0.5) * h.length_squared().sqrt();
         let f = fresnel::schlick_to(self.f0, self.f90, cos_d);
         let cosine = where_above(wo, wi, wi.z * one(FRAC_1_PI));
-        let diffuse = Colors::splat(cosine, self.diffuse).scaled(cosine);
-        let diffuse = diffuse.zip(self.lost(f), |d, lost| (one(1.0) - lost) * d);
+        let diffuse = Colors::splat(cosine, self.diffuse).scaled(self.kept_at(cos_d) * cosine);
         let value = diffuse.zip(f, |d, f| d + f * geometry);
         let share = self.specular_share(wo.z);
         (value, share * pdf_specular + (one(1.0) - share) * cosine)
@@ -172,21 +177,18 @@ impl Brdf for MetallicRoughness {
         wi
     }
 
-    /// The sum of the two parts' bounds, with 1 − F ≤ 1 − f0 in the diffuse one; within a factor of
-    /// four of the maximum.
+    /// The sum of the two parts' bounds; within a factor of four of the maximum.
     fn max_eval(&self, wo: Vec3) -> f32 {
         if wo.z <= HORIZON {
             return 0.0;
         }
-        let lost = self.lost(Colors::splat(wo.z, self.f0)).single();
-        let diffuse = ((Rgb::WHITE - lost) * self.diffuse).max_component() * FRAC_1_PI;
-        diffuse + self.f90 * self.specular().max_eval(wo)
+        self.diffuse.max_component() * FRAC_1_PI + self.f90 * self.specular().max_eval(wo)
     }
 
     #[inline]
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
         let f = fresnel::schlick_to(self.f0, self.f90, cos_theta_o);
-        (Rgb::WHITE - self.lost(f).single()) * self.diffuse + f.single()
+        self.diffuse * self.kept_at(cos_theta_o) + f.single()
     }
 }
 
@@ -265,7 +267,30 @@ mod tests {
         assert_eq!(MetallicRoughness::with_dielectric(base, 0.0, 0.4, f32::NAN).f0, Rgb::BLACK);
     }
 
-    /// By the definition: the dielectric's and the metal's BRDF, mixed.
+    /// By the definition: the dielectric's and the metal's BRDF, mixed by metalness.
+    #[test]
+    fn metalness_mixes_a_dielectric_and_a_metal() {
+        let base = Rgb::new(0.9, 0.5, 0.1);
+        let colored = Rgb::new(0.3, 0.1, 0.04);
+        let plain = |metallic| MetallicRoughness::new(base, metallic, 0.4);
+        let strong =
+            |metallic| MetallicRoughness::with_specular(base, metallic, 0.4, colored, 0.6);
+        for degrees in [0.0, 40.0, 80.0, 89.0] {
+            let (wo, wi) = (toward(degrees, 0.3), toward(50.0, 2.5));
+            for lobe in [&plain as &dyn Fn(f32) -> MetallicRoughness, &strong] {
+                let [dielectric, metal] = [0.0, 1.0].map(|metallic| lobe(metallic).eval(wo, wi));
+                for metallic in [0.2, 0.5, 0.9] {
+                    let expected = dielectric.lerp(metal, metallic);
+                    let difference = lobe(metallic).eval(wo, wi) - expected;
+                    let difference = difference.map(f32::abs).max_component();
+                    let allowed = 1e-5 * expected.max_component();
+                    assert!(difference <= allowed, "{degrees} {metallic}: {difference}");
+                }
+            }
+        }
+    }
+
+    /// By the definition of the dielectric's BRDF.
     #[test]
     fn specular_strength_and_color_change_the_dielectric_alone() {
         let base = Rgb::new(0.9, 0.5, 0.1);
