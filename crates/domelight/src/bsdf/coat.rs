@@ -1,10 +1,11 @@
 //! The clear coat of glTF (`KHR_materials_clearcoat`): a thin dielectric layer of refractive index 1.5.
 //!
-//! f_r = F D G₂/(4 cos θ_i cos θ_o), GGX with f0 = 0.04, about its own normal, because a coat is often smooth where the
-//! layer below has relief. Cosines are with respect to the coat's normal. The layers below are scaled by
-//! 1 − strength · F(cos θ_o), as in the specification; see [`super::Bsdf::layered`].
+//! f_r = F D G₂/(4 cos θ_i cos θ_o), GGX about its own normal, because a coat is often smooth where the layer below has
+//! relief. F is Schlick's reflectance with f0 = 0.04 at cos θ_o, as in the specification, whose coat reflects
+//! F(N · V) D G and leaves 1 − strength · F(N · V) to the layers below ([`super::Bsdf::layered`]). So the coat is not
+//! reciprocal. Cosines are with respect to the coat's normal.
 
-use super::{Brdf, Fresnel, Ggx, HORIZON, Masking, where_above};
+use super::{Brdf, Fresnel, Ggx, HORIZON, Masking, fresnel, where_above};
 use crate::Rgb;
 use crate::math::{Frame, Vec3};
 use crate::simd::{Colors, SimdFloat, Vectors};
@@ -46,12 +47,19 @@ impl Coat {
 
     /// The Fresnel reflectance toward `wo`, in \[0, 1\].
     pub(super) fn reflectance(&self, wo: Vec3) -> f32 {
-        Fresnel::Schlick { f0: Rgb::splat(Self::F0) }.eval(self.frame.z.dot(wo).max(0.0)).r
+        Self::fresnel(self.frame.z.dot(wo))
     }
 
+    /// The Fresnel reflectance at a cosine to the coat's normal.
+    #[inline(always)]
+    fn fresnel<F: SimdFloat>(cos_theta_o: F) -> F {
+        let one = |x| cos_theta_o.splat(x);
+        one(Self::F0) + one(1.0 - Self::F0) * fresnel::schlick_weight(cos_theta_o)
+    }
+
+    /// The lobe without the Fresnel factor.
     fn ggx(&self) -> Ggx {
-        let fresnel = Fresnel::Schlick { f0: Rgb::splat(Self::F0) };
-        Ggx::new([self.alpha; 2], fresnel, Masking::Correlated)
+        Ggx::new([self.alpha; 2], Fresnel::One, Masking::Correlated)
     }
 
     /// Transforms from the frame of the layer below to the coat's.
@@ -65,8 +73,10 @@ impl Coat {
 impl Brdf for Coat {
     #[inline(always)]
     fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
-        let (value, pdf) = self.ggx().eval_lanes(self.in_coat(wo), self.in_coat(wi));
-        let Colors([gray, ..]) = value;
+        let to_viewer = self.in_coat(wo);
+        let (value, pdf) = self.ggx().eval_lanes(to_viewer, self.in_coat(wi));
+        let Colors([geometry, ..]) = value;
+        let gray = Self::fresnel(to_viewer.z) * geometry;
         (Colors([where_above(wo, wi, gray); 3]), where_above(wo, wi, pdf))
     }
 
@@ -83,35 +93,33 @@ impl Brdf for Coat {
         Vectors::select(is_above, in_layer, axis(-Vec3::Z))
     }
 
-    /// The density of its microfacets.
     fn max_eval(&self, wo: Vec3) -> f32 {
         if wo.z <= HORIZON {
             return 0.0;
         }
-        self.ggx().max_eval(self.frame.to_local(wo))
+        let wo = self.frame.to_local(wo);
+        Self::fresnel(wo.z) * self.ggx().max_eval(wo)
     }
 
     /// The Fresnel reflectance at `cos_theta_o`, as if the coat's normal were the layer's.
     #[inline]
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
-        Fresnel::Schlick { f0: Rgb::splat(Self::F0) }.eval(cos_theta_o)
+        Rgb::splat(Self::fresnel(cos_theta_o))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bsdf::test_support::{check_bound, check_lobe, check_one_way, toward};
+    use crate::bsdf::test_support::{check_bound, check_one_way, toward};
     use crate::math::vec3;
 
     #[test]
     fn obeys_the_laws() {
         for alpha in [0.05, 0.3, 1.0] {
             let coat = Coat::new(alpha, Vec3::Z);
-            check_lobe(&coat);
-            // The bound takes the Fresnel factor for 1 where it may be: 25 times f0.
-            check_bound(&coat, 2.5 * 25.0);
-            // Its cosines are not to the normal that the law of reciprocity divides by.
+            check_one_way(&coat);
+            check_bound(&coat, 2.5);
             for normal in [vec3(0.3, -0.1, 0.9), vec3(0.0, 0.8, 0.6)] {
                 check_one_way(&Coat::new(alpha, normal));
             }
@@ -121,19 +129,25 @@ mod tests {
     #[test]
     fn the_narrowest_coat_is_finite() {
         for alpha in [f32::NAN, 0.0, 1e-30] {
-            check_lobe(&Coat::new(alpha, Vec3::Z));
+            check_one_way(&Coat::new(alpha, Vec3::Z));
         }
         check_one_way(&Coat::new(0.0, vec3(0.5, 0.5, 0.7)));
     }
 
     #[test]
-    fn a_coat_that_does_not_lean_is_a_dielectric_ggx_lobe() {
-        let fresnel = Fresnel::Schlick { f0: Rgb::splat(0.04) };
-        let ggx = Ggx::new([0.2; 2], fresnel, Masking::Correlated);
+    fn a_coat_reflects_by_the_angle_of_the_view() {
+        let ggx = Ggx::new([0.2; 2], Fresnel::One, Masking::Correlated);
         let coat = Coat::new(0.2, Vec3::Z);
-        let (wo, wi) = (toward(50.0, 0.3), toward(40.0, 3.0));
-        assert_eq!(coat.eval_pdf(wo, wi), ggx.eval_pdf(wo, wi));
         assert_eq!(coat.lean(), 0.0);
+        for degrees in [0.0f32, 50.0, 80.0] {
+            let wo = toward(degrees, 0.3);
+            let reflected = 0.04 + 0.96 * (1.0 - degrees.to_radians().cos()).powi(5);
+            for wi in [toward(40.0, 3.0), toward(70.0, 1.0)] {
+                let ((value, pdf), (white, density)) = (coat.eval_pdf(wo, wi), ggx.eval_pdf(wo, wi));
+                assert!((value.g - reflected * white.g).abs() < 1e-5 * white.g, "{degrees} {wi}");
+                assert_eq!(pdf, density);
+            }
+        }
     }
 
     #[test]

@@ -18,8 +18,8 @@
 //! # Ok::<(), domelight::bsdf::ParseMaterialError>(())
 //! ```
 //!
-//! All lobes are reciprocal: f_r(wo, wi) = f_r(wi, wo). (glTF's layers are not: the fraction that a coat or sheen
-//! leaves to the layer below depends only on `wo`, as in the specification.) Constructors clamp every parameter to
+//! All lobes but [`Coat`] are reciprocal: f_r(wo, wi) = f_r(wi, wo). (What glTF's coat reflects, and what a coat or sheen
+//! leaves to the layer below, depends on the angle of `wo`, as in the specification.) Constructors clamp every parameter to
 //! the range in which the formulas are valid, so no lobe evaluates to NaN or infinity.
 //!
 //! Rejected: trait objects (the set is closed, and the sample loop should inline); tabulated
