@@ -204,6 +204,70 @@ fn extensions_of_materials_are_kept_and_named_once_if_approximated() {
     assert!(loaded.warnings.is_empty());
 }
 
+/// Each is named once, and not where a factor of zero disables it.
+#[test]
+fn extensions_that_are_not_drawn_are_named() {
+    let of = |factor: f32| {
+        let surface = |name: &str| {
+            format!(
+                r#"{{"name":"{name}","extensions":{{"KHR_materials_iridescence":{{"iridescenceFactor":{factor}}},
+"KHR_materials_dispersion":{{"dispersion":{factor}}},
+"KHR_materials_diffuse_transmission":{{"diffuseTransmissionFactor":{factor}}}}}}}"#
+            )
+        };
+        let used = ["iridescence", "dispersion", "diffuse_transmission"]
+            .map(|name| format!("\"KHR_materials_{name}\""))
+            .join(",");
+        let more = format!(
+            r#""extensionsUsed":[{used}],"materials":[{},{}],"#,
+            surface("a"),
+            surface("b")
+        );
+        let triangles = r#"},"material":0},{"attributes":{"POSITION":0},"material":1"#;
+        loaded(&document(&more, triangles)).warnings
+    };
+    let warnings = of(0.5);
+    assert_eq!(warnings.len(), 3, "{warnings:?}");
+    for (warning, name) in
+        warnings.iter().zip(["diffuse_transmission", "dispersion", "iridescence"])
+    {
+        has(warning, &[&format!("KHR_materials_{name}"), "'a'", "1 more", "not shown"]);
+    }
+    assert!(of(0.0).is_empty(), "{:?}", of(0.0));
+}
+
+/// Rounding between vertices does not take a constant opacity below a cutoff that it reaches.
+#[test]
+fn an_opacity_at_the_cutoff_is_kept() {
+    let bsdf = r#"{"alphaMode":"MASK","alphaCutoff":0.3,"doubleSided":true}"#;
+    let (_, loaded) = material(bsdf, &[]);
+    let mut description = loaded.description;
+    description.parts[0].mesh.alphas = vec![0.3; 3];
+    let scene = Scene::new(description).unwrap();
+    for i in 0..2000u32 {
+        let [x, y] = [0.618, 0.755].map(|step: f32| (step * i as f32).fract());
+        let at = if x + y < 1.0 { vec3(x, y, 0.0) } else { vec3(1.0 - x, 1.0 - y, 0.0) };
+        let ray = Ray::new(at * 0.99 + vec3(0.003, 0.003, 1.0), -Vec3::Z);
+        assert!(scene.camera_hit(&ray, u64::from(i), 0).is_some(), "{at}");
+    }
+}
+
+/// A normal map that an exporter turns with its image shows the same bumps: the slope points where the turned image has it.
+#[test]
+fn bumps_stay_bumps_in_a_turned_image() {
+    let bsdf = |rotation: f32| {
+        format!(
+            r#"{{"normalTexture":{{"index":0,"extensions":{{"KHR_texture_transform":{{"rotation":{rotation},
+"offset":[1,1]}}}}}}}}"#
+        )
+    };
+    let images = [png([140, 128, 250, 255])];
+    let plain = shaded(&bsdf(0.0), &images).frame.z;
+    assert!(plain.x > 0.05 && plain.y.abs() < 0.01, "{plain}");
+    let turned = shaded(&bsdf(std::f32::consts::PI), &images).frame.z;
+    assert!((turned - vec3(-plain.x, -plain.y, plain.z)).length() < 1e-5, "{turned}");
+}
+
 /// The point of the triangle of [`document`] that a viewer sees at 60°, with its material. Its vertices are (1, ½, ¼).
 fn shaded(bsdf: &str, images: &[String]) -> ShadingPoint {
     let (_, loaded) = material(bsdf, images);

@@ -1,6 +1,6 @@
 //! The corners of the triangle that was hit, and the attributes interpolated between them.
 
-use super::texture::Uvs;
+use super::texture::{UvTransform, Uvs};
 use crate::geometry::{Hit, Mesh};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -46,6 +46,14 @@ impl Corners {
         Some(a * wa + b * wb + c * wc)
     }
 
+    /// An interpolated number, which rounding does not take beyond those at the corners. So a constant stays what it is.
+    #[inline]
+    pub(super) fn mix_within(&self, attribute: &[f32]) -> f32 {
+        let [a, b, c] = self.of(attribute);
+        let [wa, wb, wc] = self.weights;
+        (a * wa + b * wb + c * wc).max(a.min(b).min(c)).min(a.max(b).max(c))
+    }
+
     /// The vertex normals; 0 if the mesh has none.
     #[inline]
     pub(super) fn normals(&self, mesh: &Mesh) -> [Vec3; 3] {
@@ -58,20 +66,21 @@ impl Corners {
         [&mesh.uvs, &mesh.uvs2].map(|set| self.mix(set).unwrap_or_default())
     }
 
-    /// The tangent ∂p/∂u with the bitangent's sign as glTF defines it: the bitangent points toward
-    /// falling v, which is up in the image.
+    /// The tangent ∂p/∂u in an image that `transform` places on the mesh, with the bitangent's sign as glTF defines it:
+    /// the bitangent points toward falling v, which is up in the image.
     #[inline]
     pub(super) fn uv_tangent(
         &self,
         positions: &[Vec3],
         uvs: &[Vec2],
+        transform: &UvTransform,
         normal: Vec3,
     ) -> Option<Vec4> {
         if uvs.is_empty() {
             return None;
         }
         let [p0, p1, p2] = self.of(positions);
-        let [t0, t1, t2] = self.of(uvs);
+        let [t0, t1, t2] = self.of(uvs).map(|uv| transform.apply(uv));
         let (e1, e2, d1, d2) = (p1 - p0, p2 - p0, t1 - t0, t2 - t0);
         let sign = 1f32.copysign(d1.perp_dot(d2));
         let along_u = (sign * (d2.y * e1 - d1.y * e2)).try_normalize()?;

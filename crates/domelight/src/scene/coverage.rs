@@ -421,7 +421,7 @@ impl Scene {
         let (mesh, coverage) = (&part.mesh, &self.materials[part.material].coverage);
         let mut opacity = coverage.opacity;
         if !mesh.alphas.is_empty() {
-            opacity *= Corners::new(mesh, triangle, hit).mix(&mesh.alphas).unwrap_or(1.0);
+            opacity *= Corners::new(mesh, triangle, hit).mix_within(&mesh.alphas);
         }
         if let Some(texture) = &coverage.texture {
             opacity *= texture.alpha_at(&self.textures, uvs);

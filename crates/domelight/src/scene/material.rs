@@ -4,7 +4,7 @@
 //! and multiplied by vertex colors.
 
 use super::layers::{Channel, Coverage, Emission, Layers, NormalMap};
-use super::texture::{Texture, TextureRef, Uvs};
+use super::texture::{Texture, TextureRef, UvTransform, Uvs};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Fresnel, Lambert, MetallicRoughness, Phong};
 use crate::math::Vec3;
@@ -244,14 +244,20 @@ impl Material {
         fixed || self.normal_map.is_some() || self.layers.anisotropy.is_some() || coat_relief
     }
 
-    /// The set of texture coordinates for tangents: 0 or 1.
+    /// The set of texture coordinates for tangents, 0 or 1, and the transform to those of the image that the tangents
+    /// follow, so that bumps stay bumps in a turned image. One that maps all to a line or point is left out.
     #[inline]
-    pub(crate) fn tangent_set(&self) -> usize {
+    pub(crate) fn tangent_uvs(&self) -> (usize, UvTransform) {
         let Layers { anisotropy, clearcoat, .. } = &self.layers;
         let of_anisotropy = || anisotropy.as_ref().and_then(|a| a.texture);
         let of_coat = || clearcoat.as_ref().and_then(|c| c.normal_map).map(|n| n.texture);
         let texture = self.normal_map.map(|n| n.texture).or_else(of_anisotropy).or_else(of_coat);
-        texture.map_or(0, |texture| texture.uv_set)
+        let Some(TextureRef { uv_set, transform, .. }) = texture else {
+            return (0, UvTransform::IDENTITY);
+        };
+        let area = transform.x.perp_dot(transform.y);
+        let is_invertible = area != 0.0 && area.is_finite();
+        (uv_set, if is_invertible { transform } else { UvTransform::IDENTITY })
     }
 
     /// Adds `by` to the index of every texture.

@@ -20,10 +20,10 @@ pub(super) enum Pose {
 /// The mesh of a primitive in the world, morphed by `weights`.
 pub(super) fn place(mut geometry: Geometry, pose: &Pose, weights: &[f32]) -> Mesh {
     morph(&mut geometry.vertices, weights);
-    if let Some(set) = geometry.slot.tangent_set
+    if let Some((set, transform)) = geometry.slot.tangent_uvs
         && geometry.vertices.tangents.is_empty()
     {
-        tangents::generate(&mut geometry, set);
+        tangents::generate(&mut geometry, set, transform);
     }
     let Geometry { vertices, triangles, slot } = geometry;
     let alphas = if slot.alpha && vertices.colors.iter().any(|c| c[3] < 1.0) {
@@ -137,7 +137,7 @@ mod tests {
         let slot = Slot {
             material: 0,
             uv_sets: [None; 2],
-            tangent_set: None,
+            tangent_uvs: None,
             alpha: false,
             transmits: false,
         };

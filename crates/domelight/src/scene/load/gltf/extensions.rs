@@ -8,7 +8,7 @@ use super::json::Document;
 /// The effect of an extension on a picture under an environment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Effect {
-    /// It is supported; unsupported material features are reported per material.
+    /// It is read; features of materials that are not drawn are reported per material.
     Read,
     /// It adds only data without effect on a picture under an environment, described by the text.
     Harmless(&'static str),
@@ -16,7 +16,7 @@ pub(super) enum Effect {
     Unknown,
 }
 
-const READ: [&str; 21] = [
+const READ: [&str; 24] = [
     "CESIUM_RTC",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -25,8 +25,11 @@ const READ: [&str; 21] = [
     "KHR_draco_mesh_compression",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
     "KHR_materials_specular",

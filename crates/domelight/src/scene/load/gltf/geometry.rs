@@ -145,7 +145,7 @@ impl Reader<'_, '_> {
         let first = slot.uv_sets[0];
         let normals = self.floats("NORMAL", "VEC3", n)?;
         // glTF 2.0, 3.7.2.1: without normals, tangents are ignored.
-        let uses_tangents = slot.tangent_set.is_some() && !normals.is_empty();
+        let uses_tangents = slot.tangent_uvs.is_some() && !normals.is_empty();
         let tangents = unless_unused(self.floats("TANGENT", "VEC4", n), uses_tangents)?;
         let mut vertices = Vertices {
             normals,

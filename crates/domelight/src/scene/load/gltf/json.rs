@@ -8,16 +8,42 @@
 
 use std::collections::BTreeMap;
 
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer};
+use serde_json::Value;
 use serde_json::value::RawValue;
 
 use super::error::GltfErrorKind;
 use super::meshopt::Compression;
 
-/// A name; none where an exporter wrote `null`.
-fn name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+/// An array; empty where an exporter wrote `null`.
+fn array<'de, D, T>(deserializer: D) -> Result<Vec<T>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de>,
+{
     Option::deserialize(deserializer).map(Option::unwrap_or_default)
+}
+
+/// Removes members that are `null`, which some exporters write for members that are not there.
+fn remove_nulls(value: &mut Value) {
+    match value {
+        Value::Object(members) => {
+            members.retain(|_, member| !member.is_null());
+            members.values_mut().for_each(remove_nulls);
+        }
+        Value::Array(items) => items.iter_mut().for_each(remove_nulls),
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
+    }
+}
+
+/// Parses an item, again without its `null` members if they are in the way.
+fn parse<T: DeserializeOwned>(text: &str) -> Result<T, serde_json::Error> {
+    serde_json::from_str(text).or_else(|error| {
+        let Ok(mut value) = serde_json::from_str(text) else { return Err(error) };
+        remove_nulls(&mut value);
+        T::deserialize(value).map_err(|_| error)
+    })
 }
 
 /// The top level of the document.
@@ -26,36 +52,38 @@ fn name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<String, D::
 pub(super) struct Document<'a> {
     #[serde(borrow)]
     asset: Option<&'a RawValue>,
+    #[serde(deserialize_with = "array")]
     pub(super) extensions_used: Vec<String>,
+    #[serde(deserialize_with = "array")]
     pub(super) extensions_required: Vec<String>,
     pub(super) scene: Option<usize>,
     #[serde(borrow)]
     extensions: Option<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     accessors: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     animations: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     buffers: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     buffer_views: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     cameras: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     images: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     materials: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     meshes: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     nodes: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     samplers: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     scenes: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     skins: Vec<&'a RawValue>,
-    #[serde(borrow)]
+    #[serde(borrow, deserialize_with = "array")]
     textures: Vec<&'a RawValue>,
 }
 
@@ -85,8 +113,8 @@ struct Header<'a> {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Asset {
-    version: Option<serde_json::Value>,
-    min_version: Option<serde_json::Value>,
+    version: Option<Value>,
+    min_version: Option<Value>,
 }
 
 impl<'a> Document<'a> {
@@ -104,7 +132,7 @@ impl<'a> Document<'a> {
             let (what, count) = (T::NAME, items.len());
             GltfErrorKind::NoSuch { what, index, count }
         })?;
-        serde_json::from_str(text.get()).map_err(|source| {
+        parse(text.get()).map_err(|source| {
             let place = format!("{} {index}", T::NAME);
             GltfErrorKind::Json { place, source }
         })
@@ -133,8 +161,8 @@ fn check_version(header: &Header<'_>) -> Result<(), GltfErrorKind> {
     let asset = header.asset.and_then(|raw| serde_json::from_str::<Asset>(raw.get()).ok());
     let Some(Asset { version, min_version }) = asset else { return Ok(()) };
     // A later version may declare that version 2 suffices. Accept numbers instead of strings.
-    let text = |value: serde_json::Value| match value {
-        serde_json::Value::String(text) => text,
+    let text = |value: Value| match value {
+        Value::String(text) => text,
         other => other.to_string(),
     };
     match min_version.or(version).map(text) {
@@ -264,7 +292,7 @@ impl BufferViewExtensions {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Scene {
-    #[serde(default, deserialize_with = "name")]
+    #[serde(default)]
     pub(super) name: String,
     #[serde(default)]
     pub(super) nodes: Vec<usize>,
@@ -273,7 +301,6 @@ pub(super) struct Scene {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Node {
-    #[serde(deserialize_with = "name")]
     pub(super) name: String,
     pub(super) children: Vec<usize>,
     pub(super) matrix: Option<[f64; 16]>,
@@ -310,7 +337,7 @@ pub(super) struct Visibility {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Mesh {
-    #[serde(default, deserialize_with = "name")]
+    #[serde(default)]
     pub(super) name: String,
     #[serde(default)]
     pub(super) primitives: Vec<Primitive>,
@@ -355,7 +382,7 @@ pub(super) struct Skin {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Animation {
-    #[serde(default, deserialize_with = "name")]
+    #[serde(default)]
     pub(super) name: String,
     #[serde(default)]
     pub(super) channels: Vec<Channel>,
@@ -394,7 +421,7 @@ pub(super) enum Interpolation {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Camera {
-    #[serde(default, deserialize_with = "name")]
+    #[serde(default)]
     pub(super) name: String,
     pub(super) perspective: Option<Perspective>,
     pub(super) orthographic: Option<Orthographic>,
@@ -484,7 +511,6 @@ pub(super) struct TextureTransform {
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Material {
-    #[serde(deserialize_with = "name")]
     pub(super) name: String,
     pub(super) pbr_metallic_roughness: MetallicRoughness,
     pub(super) normal_texture: Option<TextureInfo>,
@@ -550,6 +576,30 @@ pub(super) struct MaterialExtensions {
     pub(super) transmission: Option<Transmission>,
     #[serde(rename = "KHR_materials_volume")]
     pub(super) volume: Option<Volume>,
+    #[serde(rename = "KHR_materials_iridescence")]
+    iridescence: Option<Iridescence>,
+    #[serde(rename = "KHR_materials_dispersion")]
+    dispersion: Option<Dispersion>,
+    #[serde(rename = "KHR_materials_diffuse_transmission")]
+    diffuse_transmission: Option<DiffuseTransmission>,
+}
+
+impl MaterialExtensions {
+    /// The extensions that change the material but are not drawn.
+    pub(super) fn left_out(&self) -> impl Iterator<Item = &'static str> {
+        let Self { iridescence, dispersion, diffuse_transmission, .. } = self;
+        let film = iridescence.as_ref().map(|i| i.iridescence_factor);
+        let spread = dispersion.as_ref().map(|d| d.dispersion);
+        let through = diffuse_transmission.as_ref().map(|d| d.diffuse_transmission_factor);
+        // A factor of zero disables an extension.
+        [
+            (film, "KHR_materials_iridescence"),
+            (spread, "KHR_materials_dispersion"),
+            (through, "KHR_materials_diffuse_transmission"),
+        ]
+        .into_iter()
+        .filter_map(|(factor, name)| factor.is_some_and(|factor| factor > 0.0).then_some(name))
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -652,6 +702,24 @@ pub(super) struct Volume {
     pub(super) attenuation_color: [f32; 3],
 }
 
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+struct Iridescence {
+    iridescence_factor: f32,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Dispersion {
+    dispersion: f32,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+struct DiffuseTransmission {
+    diffuse_transmission_factor: f32,
+}
+
 fn yes() -> bool {
     true
 }
@@ -689,6 +757,26 @@ mod tests {
         assert!(error.contains("node 0"), "{error}");
         let error = document.get::<Node>(2).unwrap_err().to_string();
         assert!(error.contains("node 2") && error.contains("only 2"), "{error}");
+    }
+
+    /// In the document, its items and their extensions; not as an item of an array.
+    #[test]
+    fn null_is_what_is_not_there() {
+        let json = br#"{"asset":{"version":"2.0"},"scene":null,"skins":null,"extensionsUsed":null,
+            "nodes":[{"name":null,"mesh":null,"children":null,"extensions":null,"translation":[1,2,3]}],
+            "materials":[{"alphaMode":null,"doubleSided":null,"pbrMetallicRoughness":{"metallicFactor":null,
+                "roughnessFactor":0.5},"extensions":{"KHR_materials_sheen":{"sheenRoughnessFactor":null}}}],
+            "meshes":[{"primitives":[{"attributes":{"POSITION":null},"mode":null},null]}]}"#;
+        let document = Document::new(json).unwrap();
+        assert!(document.scene.is_none() && document.count::<Skin>() == 0);
+        let node: Node = document.get(0).unwrap();
+        assert!(node.children.is_empty() && node.translation == Some([1.0, 2.0, 3.0]));
+        let material: Material = document.get(0).unwrap();
+        let base = material.pbr_metallic_roughness;
+        assert_eq!((base.metallic_factor, base.roughness_factor), (1.0, 0.5));
+        assert!(material.alpha_mode == AlphaMode::Opaque && material.extensions.sheen.is_some());
+        let error = document.get::<Mesh>(0).unwrap_err().to_string();
+        assert!(error.contains("mesh 0") && error.contains("null"), "{error}");
     }
 
     #[test]

@@ -11,18 +11,19 @@ use crate::scene::load::textures::Textures;
 use crate::scene::{
     AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, Material,
     MaterialModel, MetallicRoughnessMaterial, NormalMap, Sheen, Specular,
-    SpecularGlossinessMaterial, Texture, TextureRef, Volume,
+    SpecularGlossinessMaterial, Texture, TextureRef, UvTransform, Volume,
 };
 
 /// A primitive's material: its index, and the vertex attributes that it uses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Slot {
     /// The index of the material.
     pub(super) material: usize,
     /// The file's texture coordinate sets that become the mesh's first and second sets; `None` if unused.
     pub(super) uv_sets: [Option<u32>; 2],
-    /// Which of the two sets defines the tangents, if tangents are needed.
-    pub(super) tangent_set: Option<usize>,
+    /// Which of the two sets defines the tangents, and the transform to the image that they follow, if tangents are
+    /// needed.
+    pub(super) tangent_uvs: Option<(usize, UvTransform)>,
     /// Whether vertex opacity is used.
     pub(super) alpha: bool,
     /// Whether light passes through.
@@ -34,12 +35,14 @@ pub(super) struct Materials<'a> {
     images: Images<'a>,
     loaded: Vec<Material>,
     slots: HashMap<Option<usize>, Slot>,
+    /// The extensions that are not drawn, with the names of the materials that have them.
+    left_out: BTreeMap<&'static str, Vec<String>>,
 }
 
 impl<'a> Materials<'a> {
     pub(super) fn new(source: &Source<'a>) -> Self {
         let images = Images::new(Textures::new(source.budget));
-        Self { images, loaded: Vec::new(), slots: HashMap::new() }
+        Self { images, loaded: Vec::new(), slots: HashMap::new(), left_out: BTreeMap::new() }
     }
 
     /// The slot of a material, or of the default material.
@@ -60,16 +63,19 @@ impl<'a> Materials<'a> {
             ("", None) => "default".into(),
             (name, _) => name.into(),
         };
+        for extension in material.extensions.left_out() {
+            self.left_out.entry(extension).or_default().push(name.clone());
+        }
         let mut reader =
             Reader { source, images: &mut self.images, name: &name, uv_sets: [None; 2] };
         let material = reader.material(&material);
         let uv_sets = reader.uv_sets;
         let material = material.map_err(|e| e.within(|| format!("material '{name}'")))?;
-        let follows = material.needs_tangent().then(|| material.tangent_set());
+        let follows = material.needs_tangent().then(|| material.tangent_uvs());
         let slot = Slot {
             material: self.loaded.len(),
             uv_sets,
-            tangent_set: follows,
+            tangent_uvs: follows,
             alpha: material.coverage.mode != AlphaMode::Opaque,
             transmits: material.transmits(),
         };
@@ -78,7 +84,7 @@ impl<'a> Materials<'a> {
         Ok(slot)
     }
 
-    /// Returns all materials and textures, and warns once per approximated feature.
+    /// Returns all materials and textures, and warns once per feature that is approximated or not drawn.
     pub(super) fn finish(self, mut warn: impl FnMut(&str)) -> (Vec<Material>, Vec<Texture>) {
         let mut approximated: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
         for material in &self.loaded {
@@ -87,17 +93,22 @@ impl<'a> Materials<'a> {
             }
         }
         for (feature, names) in approximated {
-            let others = match names.len() {
-                1 => String::new(),
-                n => format!(" and of {} more", n - 1),
-            };
+            let (first, others) = (names[0], and_others(names.len()));
             warn(&format!(
-                "{feature} of material '{}'{others} is approximated: light passes straight through, without refraction",
-                names[0]
+                "{feature} of material '{first}'{others} is approximated: light passes straight through, without refraction"
             ));
+        }
+        for (extension, names) in &self.left_out {
+            let (first, others) = (&names[0], and_others(names.len()));
+            warn(&format!("{extension} of material '{first}'{others} is not shown"));
         }
         (self.loaded, self.images.finish(warn))
     }
+}
+
+/// That more than one of `count` materials have a feature.
+fn and_others(count: usize) -> String {
+    if count == 1 { String::new() } else { format!(" and of {} more", count - 1) }
 }
 
 /// Reads one material.

@@ -9,17 +9,18 @@ use bevy_mikktspace::{Geometry as MikkGeometry, TangentSpace, generate_tangents}
 
 use super::geometry::{Geometry, Vertices};
 use crate::math::Vec3;
+use crate::scene::UvTransform;
 
-/// Adds tangents for texture coordinates `set` to `geometry`, splitting vertices.
+/// Adds tangents to `geometry` for an image that `transform` places by texture coordinates `set`, splitting vertices.
 ///
 /// Without texture coordinates, nothing changes.
-pub(super) fn generate(geometry: &mut Geometry, set: usize) {
+pub(super) fn generate(geometry: &mut Geometry, set: usize, transform: UvTransform) {
     let Geometry { vertices, triangles, .. } = geometry;
     if vertices.uvs[set].is_empty() {
         return;
     }
-    let mut corners =
-        Corners { vertices, triangles, set, tangents: vec![[0.0; 4]; 3 * triangles.len()] };
+    let tangents = vec![[0.0; 4]; 3 * triangles.len()];
+    let mut corners = Corners { vertices, triangles, set, transform, tangents };
     // The error type is uninhabited.
     let Ok(()) = generate_tangents::<_, bevy_mikktspace::StdOps>(&mut corners) else { return };
     let tangents = corners.tangents;
@@ -49,6 +50,7 @@ struct Corners<'g> {
     vertices: &'g Vertices,
     triangles: &'g [[u32; 3]],
     set: usize,
+    transform: UvTransform,
     tangents: Vec<[f32; 4]>,
 }
 
@@ -83,7 +85,8 @@ impl MikkGeometry for Corners<'_> {
     }
 
     fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
-        self.vertices.uvs[self.set][self.vertex(face, corner)]
+        let uv = self.vertices.uvs[self.set][self.vertex(face, corner)];
+        self.transform.apply(uv.into()).to_array()
     }
 
     fn set_tangent(&mut self, tangent: Option<TangentSpace>, face: usize, corner: usize) {
@@ -125,6 +128,7 @@ impl Vertices {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{PI, Vec2, Vec4, vec2};
     use crate::scene::load::gltf::material::Slot;
 
     /// A square of two triangles in z = 0, with u along x and v down; optionally with the second's texture mirrored.
@@ -141,7 +145,7 @@ mod tests {
         let slot = Slot {
             material: 0,
             uv_sets: [Some(0), None],
-            tangent_set: Some(0),
+            tangent_uvs: Some((0, UvTransform::IDENTITY)),
             alpha: false,
             transmits: false,
         };
@@ -151,15 +155,35 @@ mod tests {
     #[test]
     fn tangents_follow_u_and_bitangents_point_up_in_the_image() {
         let mut geometry = square(false);
-        generate(&mut geometry, 0);
+        generate(&mut geometry, 0, UvTransform::IDENTITY);
         assert_eq!(geometry.vertices.tangents, [[1.0, 0.0, 0.0, 1.0]; 4]);
         assert_eq!(geometry.triangles, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    /// The tangent is where the image's u axis lies on the mesh: turned with the image, and mirrored with it.
+    #[test]
+    fn tangents_follow_a_turned_image() {
+        let tangents = |rotation: f32, scale: Vec2| {
+            let mut geometry = square(false);
+            generate(&mut geometry, 0, UvTransform::new(Vec2::ONE, rotation, scale));
+            assert_eq!(geometry.vertices.tangents.len(), 4);
+            Vec4::from(geometry.vertices.tangents[0])
+        };
+        for (rotation, scale, expected) in [
+            (0.0, vec2(3.0, 0.5), Vec4::new(1.0, 0.0, 0.0, 1.0)),
+            (PI, Vec2::ONE, Vec4::new(-1.0, 0.0, 0.0, 1.0)),
+            (0.5 * PI, Vec2::ONE, Vec4::new(0.0, -1.0, 0.0, 1.0)),
+            (0.0, vec2(-1.0, 1.0), Vec4::new(-1.0, 0.0, 0.0, -1.0)),
+        ] {
+            let found = tangents(rotation, scale);
+            assert!((found - expected).length() < 1e-5, "{rotation} {scale}: {found}");
+        }
     }
 
     #[test]
     fn mirrored_textures_split_vertices() {
         let mut geometry = square(true);
-        generate(&mut geometry, 0);
+        generate(&mut geometry, 0, UvTransform::IDENTITY);
         let Vertices { positions, normals, uvs, tangents, .. } = &geometry.vertices;
         assert_eq!([positions.len(), normals.len(), uvs[0].len(), tangents.len()], [6; 4]);
         for &[a, b, c] in &geometry.triangles {
@@ -174,7 +198,7 @@ mod tests {
     fn without_texture_coordinates_there_are_none() {
         let mut geometry = square(false);
         geometry.vertices.uvs = [const { Vec::new() }; 2];
-        generate(&mut geometry, 0);
+        generate(&mut geometry, 0, UvTransform::IDENTITY);
         assert!(geometry.vertices.tangents.is_empty());
     }
 }
