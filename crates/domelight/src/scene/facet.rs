@@ -5,18 +5,29 @@
 //! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Otherwise there
 //! would be black pixels along silhouettes.
 //!
+//! A normal from a map may face the viewer and yet mirror the view into the surface, where there is no light: glossy
+//! metal would have black blotches. Such a normal n is **bent toward the surface's own normal** g until the mirror
+//! direction r lies just above the surface, at r·g = t (as in Cycles, `ensure_valid_specular_reflection`). In the plane
+//! of g and n, at the angle θ from g, r·g = v_x sin 2θ + v_z cos 2θ, where v_x and v_z are the components of the
+//! direction to the viewer; so cos 2θ = (v_z t − v_x √(ρ² − t²))/ρ² with ρ² = v_x² + v_z².
+//!
 //! A smooth surface with coarse triangles is shaded as smooth: shadow rays start where the smooth surface would be,
 //! above the triangle, and may point as far down as it allows. Otherwise triangles shadow one another near the
 //! terminator, in stair-steps. (Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4.)
 
 use super::corners::Corners;
 use crate::geometry::Mesh;
-use crate::math::{Frame, Vec3, tangents};
+use crate::math::{Frame, Vec3, sqr, tangents};
 use crate::simd::{LaneMask, Lanes, Simd, SimdF32x8, SimdFloat, Vectors, lane_of};
 use crate::strategy::ShadingPoint;
 
 /// The minimum cosine between the shading normal and the direction to the viewer.
 pub(super) const MIN_COS_THETA_O: f32 = 1e-3;
+
+/// The minimum cosine between the surface's own normal and the mirror direction about a normal from a map, and the share
+/// of that to the viewer, if that is less.
+const MIN_COS_MIRROR: f32 = 0.01;
+const MIN_MIRROR_SHARE: f32 = 0.9;
 
 /// Vertex normals within this cosine of the geometric one belong to a flat triangle: 0.1°, far more than rounding.
 const COS_FLAT: f32 = 0.999_998;
@@ -142,11 +153,37 @@ impl Facet<f32> {
         self.smooth.into()
     }
 
+    /// The normal of the surface below which there is no light.
+    fn surface_normal(&self) -> Vec3 {
+        if self.is_risen { self.toward_viewer(self.smooth).into() } else { self.ng.into() }
+    }
+
+    /// A mapped normal of the front side on the viewer's side, bent if it faces away, and bent toward the surface's own
+    /// normal if it mirrors the view into the surface.
+    pub(super) fn mapped_toward_viewer(&self, normal: Vec3) -> Vec3 {
+        let normal = Vec3::from(self.toward_viewer(normal.into()));
+        let (viewer, up) = (Vec3::from(self.viewer), self.surface_normal());
+        let cos_o = viewer.dot(up);
+        let mirror = 2.0 * normal.dot(viewer) * normal.dot(up) - cos_o;
+        let least = (MIN_MIRROR_SHARE * cos_o).min(MIN_COS_MIRROR);
+        if mirror >= least {
+            return normal;
+        }
+        let Some(along) = (normal - normal.dot(up) * up).try_normalize() else { return up };
+        let across = viewer.dot(along);
+        let length2 = sqr(across) + sqr(cos_o);
+        let cos_double =
+            (cos_o * least - across * (length2 - sqr(least)).max(0.0).sqrt()) / length2;
+        let [cos, sin] = [cos_double, -cos_double].map(|c| (0.5 + 0.5 * c).clamp(0.0, 1.0).sqrt());
+        let bent = (cos * up + sin * along).try_normalize().unwrap_or(up) * self.side;
+        // At grazing views of the surface, the viewer has the last word.
+        self.toward_viewer(bent.into()).into()
+    }
+
     /// Sets all of a shading point but its BSDF.
     pub(super) fn set(&self, point: &mut ShadingPoint, frame: Frame) {
         point.position = self.position.into();
-        point.ng =
-            if self.is_risen { self.toward_viewer(self.smooth).into() } else { self.ng.into() };
+        point.ng = self.surface_normal();
         point.frame = frame;
         point.wo = frame.to_local(self.viewer.into()).normalize();
     }

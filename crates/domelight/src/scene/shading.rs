@@ -75,7 +75,13 @@ impl Scene {
         } else {
             Relief { normal: smooth, coat_normal: smooth, tangent: None }
         };
-        let toward_viewer = |normal: Vec3| Vec3::from(facet.toward_viewer(normal.into()));
+        let toward_viewer = |normal: Vec3| {
+            if normal == smooth {
+                facet.toward_viewer(normal.into()).into()
+            } else {
+                facet.mapped_toward_viewer(normal)
+            }
+        };
         let normal = toward_viewer(relief.normal);
         let frame = relief
             .tangent
@@ -125,12 +131,11 @@ impl Scene {
         uvs: &Uvs,
     ) -> Relief {
         let mesh = &part.mesh;
-        let set = match material.tangent_set() {
-            1 => &mesh.uvs2,
-            _ => &mesh.uvs,
-        };
-        let tangent = corner.mix(&mesh.tangents);
-        let tangent = tangent.or_else(|| corner.uv_tangent(&mesh.positions, set, normal));
+        let tangent = corner.mix(&mesh.tangents).or_else(|| {
+            let (set, transform) = material.tangent_uvs();
+            let uvs = if set == 1 { &mesh.uvs2 } else { &mesh.uvs };
+            corner.uv_tangent(&mesh.positions, uvs, &transform, normal)
+        });
         let Some(tangent) = tangent else {
             return Relief { normal, coat_normal: normal, tangent: None };
         };
@@ -305,6 +310,36 @@ mod tests {
         let p = look(&scene(mesh, None), vec3(3.0, 0.25, 0.5));
         assert!(p.wo.z > 0.5 * MIN_COS_THETA_O && p.wo.z < 2.0 * MIN_COS_THETA_O);
         assert!((p.frame.z.length() - 1.0).abs() < 1e-5);
+    }
+
+    /// The mirror direction about a normal from a map lies above the surface, however steep the map and from either side.
+    #[test]
+    fn mapped_normals_mirror_the_view_out_of_the_surface() {
+        let mut bent = 0;
+        for texel in [[255, 128, 128], [128, 255, 140], [10, 60, 128], [0, 0, 0], [150, 120, 250]] {
+            let scene = scene(triangle(), Some(texel));
+            for i in 0..200u8 {
+                let angle = 0.13 * f32::from(i);
+                let height = 0.001 + 0.02 * f32::from(i);
+                let height = if i % 2 == 0 { height } else { -height };
+                let from = vec3(0.25 + 2.0 * angle.cos(), 0.25 + 2.0 * angle.sin(), height);
+                let p = look(&scene, from);
+                let mirror = p.frame.to_world(vec3(-p.wo.x, -p.wo.y, p.wo.z));
+                let cos_o = p.frame.to_world(p.wo).dot(p.ng);
+                let least = (0.9 * cos_o).min(0.01);
+                // Where the surface is seen from its edge, the normal has to face the viewer first.
+                if p.wo.z > 1.01 * MIN_COS_THETA_O {
+                    assert!(mirror.dot(p.ng) > least - 1e-4, "{texel:?} {from}: {mirror}");
+                }
+                assert!(p.wo.z > 0.5 * MIN_COS_THETA_O && p.frame.z.is_finite(), "{texel:?}");
+                bent += usize::from((mirror.dot(p.ng) - least).abs() < 1e-4);
+            }
+        }
+        assert!(bent > 100, "{bent}");
+        // A gentle relief keeps its normals.
+        let p = look(&scene(triangle(), Some([150, 128, 250])), vec3(0.5, 1.0, 3.0));
+        let unbent = vec3(45.0, 1.0, 245.0).normalize();
+        assert!((p.frame.z - unbent).length() < 1e-3, "{}", p.frame.z);
     }
 
     /// Triangles of a coarse ball do not shade one another: rays start on the ball, and leave it wherever its normal says.
