@@ -123,25 +123,33 @@ const trimmed = (words: string[], usual: string[], least: number) => {
   return words.slice(0, n).join(":");
 };
 
-const microfacet = (key: string, label: string): Kind => ({
+/** The parts before a last word "single", and what it says. */
+const scattering = (words: string[]): [string[], string] =>
+  (words.at(-1) === "single" ? [words.slice(0, -1), "single"] : [words, "multiple"]);
+const SCATTERING = choice("Scattering", [["multiple", "multiple"], ["single", "single"]]);
+const scattered = (text: string, times: string | undefined) => (times === "single" ? `${text}:single` : text);
+
+const microfacet = (key: string, label: string, more: (typeof SCATTERING)[] = []): Kind => ({
   key, label,
   fields: [
     alpha("Roughness α", 0.2), { kind: "number", name: "αy : αx", min: 0.1, max: 1, step: 0.05, value: "1" },
     { ...choice("Fresnel", [["one", "none"], ["0.04", "dielectric, 4 %"], ["color", "of a color"], ...METALS]), value: "gold" },
     { ...color("Reflectance", "0.9,0.6,0.3"), when: (values) => values[2] === "color" },
     choice("Masking", [["separable", "separable"], ["correlated", "height-correlated"]]),
+    ...more,
   ],
-  text: ([a, ratio, fresnel, reflectance, masking]) => {
+  text: ([a, ratio, fresnel, reflectance, masking, times]) => {
     const across = rounded(Math.max(Number(a) * Number(ratio), 0.0001));
     const alphas = Number(ratio) === 1 ? a : `${a},${across}`;
-    return trimmed([key, alphas, fresnel === "color" ? reflectance : fresnel, masking], ["", "", "one", "separable"], 2);
+    return scattered(trimmed([key, alphas, fresnel === "color" ? reflectance : fresnel, masking], ["", "", "one", "separable"], 2), times);
   },
-  parse: (words) => {
+  parse: (all) => {
+    const [words, times] = more.length > 0 ? scattering(all) : [all, "multiple"];
     const [a, b] = (words[0] ?? "").split(",");
     if (words.length < 1 || words.length > 3 || !isNumber(a)) return null;
     const ratio = b === undefined ? "1" : rounded(Number(b) / Number(a));
     const fresnel = words[1] ?? "one", named = ["one", "0.04", "aluminium", ...METALS.map(([metal]) => metal)].includes(fresnel);
-    return [a, ratio, fresnel === "aluminium" ? "aluminum" : named ? fresnel : "color", named ? "0.9,0.6,0.3" : fresnel, words[2] ?? "separable"];
+    return [a, ratio, fresnel === "aluminium" ? "aluminum" : named ? fresnel : "color", named ? "0.9,0.6,0.3" : fresnel, words[2] ?? "separable", ...more.map(() => times)];
   },
 });
 
@@ -163,12 +171,17 @@ export const MATERIALS: Kind[] = [
     text: (values) => trimmed(["ward", ...values], ["", ...WARD], 3),
     parse: (words) => inOrder(1, [WARD[0], words[0], WARD[2], WARD[3]])(words),
   },
-  microfacet("ggx", "GGX"),
+  microfacet("ggx", "GGX", [SCATTERING]),
   microfacet("beckmann", "Beckmann"),
   {
     key: "gltf", label: "glTF metallic-roughness",
-    fields: [color("Base color", GLTF[0]), unit("Metallic", 0), unit("Roughness", 0.3), unit("Specular", 1), color("Its color", "1"), unit("Anisotropy", 0)],
-    text: (values) => trimmed(["gltf", ...values], ["", ...GLTF], 4), parse: inOrder(3, GLTF),
+    fields: [color("Base color", GLTF[0]), unit("Metallic", 0), unit("Roughness", 0.3), unit("Specular", 1), color("Its color", "1"), unit("Anisotropy", 0), SCATTERING],
+    text: (values) => scattered(trimmed(["gltf", ...values.slice(0, 6)], ["", ...GLTF], 4), values[6]),
+    parse: (all) => {
+      const [words, times] = scattering(all);
+      const values = inOrder(3, GLTF)(words);
+      return values && [...values, times];
+    },
   },
   { key: "mix", label: "half diffuse, half GGX", fields: [], text: () => "mix", parse: () => [] },
 ];

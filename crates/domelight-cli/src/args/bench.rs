@@ -41,8 +41,8 @@ pub(crate) struct BenchArguments {
     /// Probes: files, folders of files, or built-in probes [default: sky, studio, cathedral]
     #[arg(long, value_name = "PROBE", num_args = 1.., value_delimiter = ',', help_heading = "Inputs")]
     pub(crate) probes: Vec<String>,
-    /// Materials, separated by commas; own is the scene's own [default: diffuse:0.8, ggx:0.2, ggx:0.05,
-    /// phong:50:0.5:0.5; own for glTF and scene files]
+    /// Materials, separated by commas; own is the scene's own [default: diffuse:0.8, ggx:0.2:single,
+    /// ggx:0.05:single, phong:50:0.5:0.5; own for glTF and scene files]
     #[arg(long, value_name = "LIST", help_heading = "Inputs")]
     pub(crate) materials: Option<String>,
     /// Cases of these scenes, probes and materials, each a comma-separated list; may be repeated

@@ -24,7 +24,7 @@ const LECTURE_SIZE: [usize; 2] = [176, 248];
 const LECTURE_MATERIALS: [&str; 2] = ["phong:50:1", "phong:50:1:0.5"];
 
 const SIZE: [usize; 2] = [256, 256];
-const MATERIALS: &str = "diffuse:0.8,ggx:0.2,ggx:0.05,phong:50:0.5:0.5";
+const MATERIALS: &str = "diffuse:0.8,ggx:0.2:single,ggx:0.05:single,phong:50:0.5:0.5";
 const MESH: BuiltinScene = BuiltinScene::Statue;
 const PROBES: [BuiltinProbe; 3] =
     [BuiltinProbe::Sky, BuiltinProbe::Studio, BuiltinProbe::Cathedral];

@@ -10,7 +10,7 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use domelight::bsdf::{Fresnel, Masking, MaterialSpec};
+use domelight::bsdf::{Fresnel, Masking, MaterialSpec, Scattering};
 use domelight::math::{Mat3, PI, Vec3};
 use domelight::picture::exr::ExrLayers;
 use domelight::scene::Projection;
@@ -253,7 +253,7 @@ fn bsdf(material: &MaterialSpec) -> Option<Value> {
         let reflectance = json!({ "type": "rgb", "value": albedo.to_array() });
         json!({ "type": "diffuse", "reflectance": reflectance })
     };
-    // Its roughconductor masks separably; "none" is a perfect mirror's F = 1.
+    // Its roughconductor masks separably and scatters once; "none" is a perfect mirror's F = 1.
     let ggx = |alpha: f32| {
         json!({
             "type": "roughconductor", "material": "none", "distribution": "ggx",
@@ -262,11 +262,12 @@ fn bsdf(material: &MaterialSpec) -> Option<Value> {
     };
     match *material {
         MaterialSpec::Diffuse { albedo } => Some(diffuse(albedo)),
-        MaterialSpec::Ggx { alpha: [x, y], fresnel: Fresnel::One, masking: Masking::Separable }
-            if x == y =>
-        {
-            Some(ggx(x))
-        }
+        MaterialSpec::Ggx {
+            alpha: [x, y],
+            fresnel: Fresnel::One,
+            masking: Masking::Separable,
+            scattering: Scattering::Single,
+        } if x == y => Some(ggx(x)),
         MaterialSpec::Mix => Some(json!({
             "type": "blendbsdf", "weight": 0.5, "a": diffuse(Rgb::splat(0.5)), "b": ggx(0.1),
         })),
@@ -281,10 +282,16 @@ mod tests {
     #[test]
     fn materials_that_both_have() {
         let bsdf = |text: &str| bsdf(&text.parse().unwrap());
-        assert_eq!(bsdf("ggx:0.2").unwrap()["type"], "roughconductor");
+        assert_eq!(bsdf("ggx:0.2:single").unwrap()["type"], "roughconductor");
         assert_eq!(bsdf("diffuse:0.8").unwrap()["reflectance"]["value"][2], json!(0.8f32));
         assert_eq!(bsdf("mix").unwrap()["type"], "blendbsdf");
-        for other in ["phong:50", "ggx:0.2:gold", "ggx:0.1,0.2", "ggx:0.2:one:correlated"] {
+        for other in [
+            "phong:50",
+            "ggx:0.2",
+            "ggx:0.2:gold:single",
+            "ggx:0.1,0.2:single",
+            "ggx:0.2:one:correlated:single",
+        ] {
             assert!(bsdf(other).is_none(), "{other}");
         }
     }

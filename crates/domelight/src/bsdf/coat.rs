@@ -143,7 +143,8 @@ mod tests {
             let wo = toward(degrees, 0.3);
             let reflected = 0.04 + 0.96 * (1.0 - degrees.to_radians().cos()).powi(5);
             for wi in [toward(40.0, 3.0), toward(70.0, 1.0)] {
-                let ((value, pdf), (white, density)) = (coat.eval_pdf(wo, wi), ggx.eval_pdf(wo, wi));
+                let ((value, pdf), (white, density)) =
+                    (coat.eval_pdf(wo, wi), ggx.eval_pdf(wo, wi));
                 assert!((value.g - reflected * white.g).abs() < 1e-5 * white.g, "{degrees} {wi}");
                 assert_eq!(pdf, density);
             }

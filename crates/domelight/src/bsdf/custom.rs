@@ -147,7 +147,7 @@ mod tests {
                 (mine.sample(wo, 0.3, vec2(0.2, 0.7)), theirs.sample(wo, 0.3, vec2(0.2, 0.7)));
             assert!((a.unwrap().wi - b.unwrap().wi).length() < 1e-6);
         }
-        assert_eq!(size_of::<Lobe>(), 44);
+        assert_eq!(size_of::<Lobe>(), 56);
         assert_eq!(mine, mine);
     }
 }

@@ -5,7 +5,9 @@
 //! Spherical Caps"), which gives the density of Heitz 2018 with less arithmetic. Sampling D cos θ
 //! instead would give unbounded weights at grazing angles.
 
-use super::microfacet::{Masking, Microfacet, NormalDistribution};
+mod multiple_scattering;
+
+use super::microfacet::{Masking, Microfacet, NormalDistribution, Scattering};
 use super::{Fresnel, range};
 use crate::math::{FRAC_1_PI, sin_cos_turns, sqr};
 use crate::simd::{SimdFloat, Vectors};
@@ -18,6 +20,13 @@ impl Ggx {
     /// \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(alpha: [f32; 2], fresnel: Fresnel, masking: Masking) -> Self {
         Self::with_normals(GgxNormals::new(alpha), fresnel, masking)
+    }
+
+    /// The same with or without the light that is scattered more than once. With it, the lobe is not reciprocal.
+    #[must_use]
+    pub fn scattering(mut self, scattering: Scattering) -> Self {
+        self.scattering = scattering;
+        self
     }
 }
 
@@ -82,6 +91,11 @@ impl NormalDistribution for GgxNormals {
         Vectors { x: ax * h.x, y: ay * h.y, z: h.z }
     }
 
+    #[inline(always)]
+    fn repeated<F: SimdFloat>(&self, masking: Masking, cos_theta_o: F) -> F {
+        multiple_scattering::repeated(self.alpha, masking, cos_theta_o)
+    }
+
     /// D G₁(wo)/(4 cos θ_o) = D/(4 σ_o).
     #[inline(always)]
     fn reflected_pdf<F: SimdFloat>(&self, _h: Vectors<F>, d: F, sigma_o: F) -> F {
@@ -93,7 +107,9 @@ impl NormalDistribution for GgxNormals {
 mod tests {
     use super::*;
     use crate::Rgb;
-    use crate::bsdf::test_support::{check_bound, check_lobe, directional_albedo, toward};
+    use crate::bsdf::test_support::{
+        check_bound, check_lobe, check_one_way, directional_albedo, toward,
+    };
     use crate::bsdf::{Brdf, Conductor};
     use crate::math::vec2;
 
@@ -111,6 +127,45 @@ mod tests {
                     let lobe = Ggx::new(alpha, fresnel, masking);
                     check_lobe(&lobe);
                     check_bound(&lobe, 2.5);
+                }
+            }
+        }
+    }
+
+    /// With multiple scattering, too, but reciprocity.
+    #[test]
+    fn obeys_the_other_laws_with_multiple_scattering() {
+        for alpha in [[0.05, 0.05], [0.1, 0.5], [1.0, 1.0], [10.0, 10.0]] {
+            for masking in [Masking::Correlated, Masking::Separable] {
+                for fresnel in FRESNELS {
+                    let single = Ggx::new(alpha, fresnel, masking);
+                    let lobe = single.scattering(Scattering::Multiple);
+                    check_one_way(&lobe);
+                    let (wo, wi) = (toward(50.0, 0.3), toward(40.0, 3.0));
+                    assert_eq!(lobe.pdf(wo, wi), single.pdf(wo, wi));
+                    if alpha[0] <= 1.0 {
+                        check_bound(&lobe, 2.5);
+                    }
+                }
+            }
+        }
+    }
+
+    /// A white metal returns all light that it receives, a colored one what it does not absorb in a few reflections.
+    #[test]
+    fn multiple_scattering_returns_what_is_lost() {
+        let albedo = |alpha: f32, f0: f32, masking, degrees| {
+            let fresnel = Fresnel::Schlick { f0: Rgb::splat(f0) };
+            let lobe = Ggx::new([alpha; 2], fresnel, masking).scattering(Scattering::Multiple);
+            directional_albedo(&lobe, toward(degrees, 0.3))[0]
+        };
+        for masking in [Masking::Correlated, Masking::Separable] {
+            for alpha in [0.03, 0.1, 0.37, 0.7, 1.0] {
+                for degrees in [0.0, 40.0, 70.0, 85.0] {
+                    let white = albedo(alpha, 1.0, masking, degrees);
+                    assert!((white - 1.0).abs() < 5e-3, "{masking:?} {alpha} {degrees}: {white}");
+                    let half = albedo(alpha, 0.5, masking, degrees);
+                    assert!(half < 1.0 && half > 0.3, "{masking:?} {alpha} {degrees}: {half}");
                 }
             }
         }

@@ -99,7 +99,7 @@ impl From<CustomLobe> for Lobe {
 /// The maximum number of lobes of a [`Bsdf`].
 pub const MAX_LOBES: usize = 3;
 
-/// A sum of at most [`MAX_LOBES`] weighted lobes: plain data of 160 bytes, no heap.
+/// A sum of at most [`MAX_LOBES`] weighted lobes: plain data of 196 bytes, no heap.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf {
     terms: [Term; MAX_LOBES],
@@ -360,8 +360,8 @@ mod tests {
 
     #[test]
     fn is_small() {
-        assert_eq!(size_of::<Lobe>(), 44);
-        assert_eq!(size_of::<Bsdf>(), 160);
+        assert_eq!(size_of::<Lobe>(), 56);
+        assert_eq!(size_of::<Bsdf>(), 196);
     }
 
     #[test]

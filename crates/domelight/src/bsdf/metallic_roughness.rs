@@ -14,14 +14,20 @@
 //! What the diffuse part keeps, 1 − f0 − (f90 − f0) (1 − h·wo)⁵ of the dielectric, is 1 − f0 times
 //! 1 − (1 − `kept`) (1 − h·wo)⁵, where `kept` = (1 − f90)/(1 − f0).
 //!
-//! This is the specification's formula, so that materials look as in other glTF viewers. It does not
+//! The specular part contains the light that is scattered more than once ([`super::Scattering`]), so that rough metals
+//! are as bright as their base color says. A lobe with reflectance F has (1 − E)/E f0 F more, and the mixture has the
+//! mixture of both: (1 − E)/E times a Schlick term from `twice`, the mixture of the squares of f0, to `f0`.
+//!
+//! The rest is the specification's formula, so that materials look as in other glTF viewers. It does not
 //! conserve energy: over all directions of light, half vectors are less oblique than the view, so
 //! 1 − F removes too little from the diffuse part at grazing angles. A white dielectric with roughness
 //! 0.3 has the albedo 1.00 at 45°, 1.15 at 75° and 1.29 at 85°.
 
 use super::ggx::{Ggx, GgxNormals};
 use super::microfacet::{Masking, reflect_about};
-use super::{Brdf, Fresnel, HORIZON, NormalDistribution as _, fresnel, range, where_above};
+use super::{
+    Brdf, Fresnel, HORIZON, NormalDistribution as _, ROUNDING, fresnel, range, where_above,
+};
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3, sqr};
 use crate::sampling::warp;
@@ -37,6 +43,8 @@ pub struct MetallicRoughness {
     f0: Rgb,
     /// At least as large as any channel of `f0`.
     f90: f32,
+    /// What a further reflection leaves of `f0`: the mixture of the squares. Black for single scattering.
+    twice: Rgb,
     alpha: [f32; 2],
 }
 
@@ -67,12 +75,14 @@ impl MetallicRoughness {
         let strength = range::unit(strength);
         let dielectric = range::reflectance(f0) * strength;
         let entering = 1.0 - dielectric.max_component();
+        let f0 = dielectric.lerp(base, metallic);
         Self {
             diffuse: base * (1.0 - metallic) * entering,
             // Nothing enters a perfect reflector.
             kept: if entering > 0.0 { range::unit((1.0 - strength) / entering) } else { 0.0 },
-            f0: dielectric.lerp(base, metallic),
+            f0,
             f90: strength + (1.0 - strength) * metallic,
+            twice: (dielectric * dielectric).lerp(base * base, metallic),
             alpha: range::alpha([sqr(range::unit(roughness)); 2]),
         }
         .ordered()
@@ -94,6 +104,21 @@ impl MetallicRoughness {
         Self { diffuse: self.diffuse * (1.0 - range::unit(transmission)), ..self }
     }
 
+    /// The same without the light that is scattered more than once: the specification's formula, which is reciprocal.
+    #[must_use]
+    pub fn single_scattering(self) -> Self {
+        Self { twice: Rgb::BLACK, ..self }
+    }
+
+    /// (1 − E)/E of the specular part, or `None` for single scattering.
+    #[inline(always)]
+    fn repeated<F: SimdFloat>(&self, cos_theta_o: F) -> Option<F> {
+        if self.twice.is_black() {
+            return None;
+        }
+        Some(GgxNormals::new(self.alpha).repeated(Masking::Correlated, cos_theta_o))
+    }
+
     /// Ensures f90 ≥ f0 to the last bit, regardless of rounding.
     fn ordered(self) -> Self {
         Self { f90: self.f90.max(self.f0.max_component()), ..self }
@@ -108,7 +133,7 @@ impl MetallicRoughness {
         let f0 = specular.map(unit);
         let diffuse = diffuse.map(unit) * (1.0 - f0.max_component()) * (Rgb::WHITE - f0);
         let of_roughness = Self::new(Rgb::BLACK, 0.0, 1.0 - unit(glossiness));
-        Self { diffuse, f0, ..of_roughness }
+        Self { diffuse, f0, twice: f0 * f0, ..of_roughness }
     }
 
     pub(super) fn alpha(&self) -> [f32; 2] {
@@ -127,24 +152,20 @@ impl MetallicRoughness {
         cos_d.splat(1.0) - cos_d.splat(1.0 - self.kept) * fresnel::schlick_weight(cos_d)
     }
 
-    /// The probability of sampling the specular part: at most [`MOST_SPECULAR`] if there is a diffuse part, whose weights would
-    /// otherwise be unbounded at grazing views.
+    /// The probability of sampling the specular part: its share of the light that both reflect toward this view, if the
+    /// half vectors of the specular part are near the normal. Those of the diffuse part are near no grazing direction, so
+    /// it counts whole: over all directions of light, it loses a few percent to (1 − h·wo)⁵ even at a grazing view.
     #[inline]
     pub(super) fn specular_share<F: SimdFloat>(&self, cos_theta_o: F) -> F {
         let one = |x| cos_theta_o.splat(x);
         let grazing = fresnel::schlick_weight(cos_theta_o);
-        let (diffuse_mean, f0_mean) = (self.diffuse.mean(), self.f0.mean());
+        let f0_mean = self.f0.mean();
         let specular = one(f0_mean) + one(self.f90 - f0_mean) * grazing;
-        let diffuse = self.kept_at(cos_theta_o) * one(diffuse_mean);
-        // At most this, and where nothing is specular: all of a black metal, which has no diffuse part.
-        let [most, none] = if diffuse_mean > 0.0 { [MOST_SPECULAR, 0.0] } else { [1.0, 1.0] };
-        let share = F::select(one(0.0).lt(specular), specular / (specular + diffuse), one(none));
-        share.min(one(most))
+        let both = specular + one(self.diffuse.mean());
+        // A black metal reflects nothing at normal incidence, and has no diffuse part.
+        F::select(one(0.0).lt(both), specular / both, one(1.0))
     }
 }
-
-/// The maximum probability of sampling the specular part if there is a diffuse part.
-const MOST_SPECULAR: f32 = 0.95;
 
 impl Brdf for MetallicRoughness {
     #[inline(always)]
@@ -156,6 +177,15 @@ impl Brdf for MetallicRoughness {
         let pdf_specular = where_above(wo, wi, pdf_specular);
         let cos_d = one(0.5) * h.length_squared().sqrt();
         let f = fresnel::schlick_to(self.f0, self.f90, cos_d);
+        let f = match self.repeated(wo.z) {
+            None => f,
+            Some(repeated) => {
+                let weight = fresnel::schlick_weight(cos_d);
+                let more = Colors::splat(weight, self.f0 - self.twice).scaled(weight);
+                let more = more.zip(Colors::splat(weight, self.twice), |more, twice| twice + more);
+                f.zip(more, |f, more| f + repeated * more)
+            }
+        };
         let cosine = where_above(wo, wi, wi.z * one(FRAC_1_PI));
         let diffuse = Colors::splat(cosine, self.diffuse).scaled(self.kept_at(cos_d) * cosine);
         let value = diffuse.zip(f, |d, f| d + f * geometry);
@@ -182,21 +212,29 @@ impl Brdf for MetallicRoughness {
         if wo.z <= HORIZON {
             return 0.0;
         }
-        self.diffuse.max_component() * FRAC_1_PI + self.f90 * self.specular().max_eval(wo)
+        // What is scattered more than once is at most this multiple of F: at normal incidence, or at grazing incidence.
+        let share = |of: f32, all: f32| if all > 0.0 { of / all } else { 0.0 };
+        let [f0, twice] = [self.f0, self.twice].map(Rgb::to_array);
+        let normal = twice.into_iter().zip(f0).map(|(twice, f0)| share(twice, f0));
+        let most = normal.fold(share(self.f0.max_component(), self.f90), f32::max);
+        let factor = self.repeated(wo.z).map_or(1.0, |repeated| 1.0 + most * repeated);
+        let specular = self.f90 * factor * self.specular().max_eval(wo);
+        self.diffuse.max_component() * FRAC_1_PI + specular * ROUNDING
     }
 
     #[inline]
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
-        let f = fresnel::schlick_to(self.f0, self.f90, cos_theta_o);
-        self.diffuse * self.kept_at(cos_theta_o) + f.single()
+        self.diffuse + fresnel::schlick_to(self.f0, self.f90, cos_theta_o).single()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bsdf::Lambert;
-    use crate::bsdf::test_support::{check_bound, check_lobe, directional_albedo, toward};
+    use crate::bsdf::test_support::{
+        check_bound, check_lobe, check_one_way, directional_albedo, toward,
+    };
+    use crate::bsdf::{Lambert, Scattering};
     use crate::math::{vec2, vec3};
 
     #[test]
@@ -205,7 +243,8 @@ mod tests {
             for roughness in [0.25, 0.6, 1.0] {
                 let base = Rgb::new(0.9, 0.5, 0.1);
                 let lobe = MetallicRoughness::new(base, metallic, roughness);
-                check_lobe(&lobe);
+                check_lobe(&lobe.single_scattering());
+                check_one_way(&lobe);
                 // The two parts need not peak together.
                 check_bound(&lobe, 4.0);
             }
@@ -219,9 +258,11 @@ mod tests {
         let same = MetallicRoughness::specular_glossiness(base / 0.96, Rgb::splat(0.04), 0.7);
         assert!((plastic.diffuse.r - same.diffuse.r).abs() < 1e-6);
         assert!((plastic.alpha[0] - same.alpha[0]).abs() < 1e-6 && plastic.f0 == same.f0);
-        let metal = MetallicRoughness::specular_glossiness(base, Rgb::WHITE, 0.5);
-        check_lobe(&metal);
-        check_lobe(&MetallicRoughness::specular_glossiness(base, Rgb::splat(0.2), 0.4));
+        for specular in [1.0, 0.2] {
+            let lobe = MetallicRoughness::specular_glossiness(base, Rgb::splat(specular), 0.4);
+            check_lobe(&lobe.single_scattering());
+            check_one_way(&lobe);
+        }
     }
 
     #[test]
@@ -229,9 +270,13 @@ mod tests {
         let base = Rgb::new(0.9, 0.6, 0.2);
         let lobe = MetallicRoughness::new(base, 1.0, 0.5);
         let ggx = Ggx::new([0.25; 2], Fresnel::Schlick { f0: base }, Masking::Correlated);
+        let all = ggx.scattering(Scattering::Multiple);
         for degrees in [0.0, 45.0, 80.0] {
             let (wo, wi) = (toward(degrees, 0.2), toward(30.0, 3.0));
-            assert_eq!(lobe.eval_pdf(wo, wi), ggx.eval_pdf(wo, wi));
+            assert_eq!(lobe.single_scattering().eval_pdf(wo, wi), ggx.eval_pdf(wo, wi));
+            let (found, expected) = (lobe.eval(wo, wi), all.eval(wo, wi));
+            let difference = (found - expected).map(f32::abs).max_component();
+            assert!(difference < 1e-5 * expected.max_component(), "{degrees}: {difference}");
         }
     }
 
@@ -246,7 +291,7 @@ mod tests {
                     [i % 32, i / 32 % 32, i / 1024].map(|i| (i as f32 + 0.5) / 32.0);
                 let Some(sample) = lobe.sample(wo, u_lobe, vec2(u, v)) else { continue };
                 let weight = sample.value.max_component() / sample.pdf;
-                assert!(weight < 1.1 / (1.0 - MOST_SPECULAR), "{cos_o} {u_lobe} {u} {v}: {weight}");
+                assert!(weight < 2.2, "{cos_o} {u_lobe} {u} {v}: {weight}");
             }
         }
     }
@@ -261,7 +306,7 @@ mod tests {
         for f0 in [0.0, 0.17, 1.0] {
             let lobe = MetallicRoughness::with_dielectric(base, 0.0, 0.4, f0);
             assert_eq!(lobe.f0, Rgb::splat(f0));
-            check_lobe(&lobe);
+            check_one_way(&lobe);
             check_bound(&lobe, 4.0);
         }
         assert_eq!(MetallicRoughness::with_dielectric(base, 0.0, 0.4, f32::NAN).f0, Rgb::BLACK);
@@ -273,21 +318,35 @@ mod tests {
         let base = Rgb::new(0.9, 0.5, 0.1);
         let colored = Rgb::new(0.3, 0.1, 0.04);
         let plain = |metallic| MetallicRoughness::new(base, metallic, 0.4);
-        let strong =
-            |metallic| MetallicRoughness::with_specular(base, metallic, 0.4, colored, 0.6);
+        let weak = |metallic| {
+            MetallicRoughness::with_specular(base, metallic, 0.4, colored, 0.6).single_scattering()
+        };
+        let strong = |metallic| MetallicRoughness::with_specular(base, metallic, 0.4, colored, 1.0);
         for degrees in [0.0, 40.0, 80.0, 89.0] {
             let (wo, wi) = (toward(degrees, 0.3), toward(50.0, 2.5));
-            for lobe in [&plain as &dyn Fn(f32) -> MetallicRoughness, &strong] {
-                let [dielectric, metal] = [0.0, 1.0].map(|metallic| lobe(metallic).eval(wo, wi));
+            let lobes: [&dyn Fn(f32) -> MetallicRoughness; 3] = [&plain, &weak, &strong];
+            for lobe in lobes {
+                let of = |metallic| lobe(metallic).eval(wo, wi);
                 for metallic in [0.2, 0.5, 0.9] {
-                    let expected = dielectric.lerp(metal, metallic);
-                    let difference = lobe(metallic).eval(wo, wi) - expected;
-                    let difference = difference.map(f32::abs).max_component();
+                    let expected = of(0.0).lerp(of(1.0), metallic);
+                    let difference = (of(metallic) - expected).map(f32::abs).max_component();
                     let allowed = 1e-5 * expected.max_component();
                     assert!(difference <= allowed, "{degrees} {metallic}: {difference}");
                 }
             }
         }
+    }
+
+    /// At normal view, half a rough metal is half as bright as a metal and half as bright as a dielectric.
+    #[test]
+    fn half_a_metal_is_half_as_bright_as_each() {
+        let base = Rgb::new(1.0, 0.5, 0.2);
+        let [dielectric, half, metal] = [0.0, 0.5, 1.0].map(|metallic| {
+            let lobe = MetallicRoughness::new(base, metallic, 0.7).single_scattering();
+            directional_albedo(&lobe, Vec3::Z)[0]
+        });
+        assert!((half - 0.5 * (dielectric + metal)).abs() < 1e-5);
+        assert!((half - 0.843).abs() < 2e-3, "{half}");
     }
 
     /// By the definition of the dielectric's BRDF.
@@ -304,6 +363,7 @@ mod tests {
             (Rgb::splat(0.04), 0.0),
         ] {
             let lobe = MetallicRoughness::with_specular(base, 0.0, 0.4, f0, strength);
+            let lobe = lobe.single_scattering();
             let f = f0.map(|f0| strength * (f0.min(1.0) + (1.0 - f0.min(1.0)) * x));
             let diffuse = base * (wi.z * FRAC_1_PI * (1.0 - f.max_component()));
             let difference = (diffuse + f * ggx - lobe.eval(wo, wi)).map(f32::abs).max_component();
@@ -315,10 +375,11 @@ mod tests {
                 for roughness in [0.2, 0.7] {
                     let lobe =
                         MetallicRoughness::with_specular(base, metallic, roughness, f0, strength);
-                    check_lobe(&lobe);
+                    check_lobe(&lobe.single_scattering());
+                    check_one_way(&lobe);
                     check_bound(&lobe, 4.0);
                     let brushed = lobe.anisotropic(0.8);
-                    check_lobe(&brushed);
+                    check_one_way(&brushed);
                     // Rings of half vectors are coarse for slopes of 0.65 by 0.04.
                     check_bound(&brushed, 8.0);
                 }
@@ -342,7 +403,7 @@ mod tests {
         let difference = (half - (opaque + clear) * 0.5).map(f32::abs).max_component();
         assert!(difference < 1e-6 && clear.r < opaque.r, "{opaque:?} {half:?} {clear:?}");
         assert_eq!(of(1.0, 1.0), of(1.0, 0.0));
-        check_lobe(&MetallicRoughness::new(base, 0.0, 0.5).transmitting(1.0));
+        check_one_way(&MetallicRoughness::new(base, 0.0, 0.5).transmitting(1.0));
     }
 
     #[test]
@@ -350,7 +411,8 @@ mod tests {
         let base = Rgb::new(0.9, 0.6, 0.2);
         let lobe = MetallicRoughness::new(base, 1.0, 0.5).anisotropic(0.6);
         let alpha = [0.25 * (1.0 - 0.36) + 0.36, 0.25];
-        let ggx = Ggx::new(alpha, Fresnel::Schlick { f0: base }, Masking::Correlated);
+        let ggx = Ggx::new(alpha, Fresnel::Schlick { f0: base }, Masking::Correlated)
+            .scattering(Scattering::Multiple);
         let (wo, wi) = (toward(45.0, 0.2), toward(30.0, 3.0));
         let difference = (lobe.eval(wo, wi) - ggx.eval(wo, wi)).map(f32::abs).max_component();
         assert!(difference < 1e-5, "{difference}");
@@ -377,7 +439,7 @@ mod tests {
         for roughness in [0.0, 1e-30, 1e-5, 0.01] {
             let lobe = MetallicRoughness::new(Rgb::WHITE, 1.0, roughness);
             assert_eq!(lobe.alpha(), [crate::bsdf::MIN_ALPHA; 2]);
-            check_lobe(&lobe);
+            check_one_way(&lobe);
         }
     }
 

@@ -14,7 +14,8 @@
 //! The half vector stays unnormalized, H = wo + wi with |H| = 2 h·wi, so that neither a square root
 //! nor 1 − cos² appears where a lobe is narrow.
 //!
-//! Single scattering only: rough lobes lose the light that is scattered more than once.
+//! This is single scattering: rough lobes lose the light that is scattered more than once. A GGX lobe may have it back
+//! ([`Scattering::Multiple`]).
 
 use super::{Brdf, Fresnel, HORIZON, ROUNDING, where_above};
 use crate::Rgb;
@@ -31,6 +32,16 @@ pub enum Masking {
     Separable,
 }
 
+/// Whether a lobe contains the light that its microfacets scatter more than once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scattering {
+    /// It does not: rough lobes lose light.
+    #[default]
+    Single,
+    /// It does, approximately.
+    Multiple,
+}
+
 /// A distribution of microfacet normals with sampling.
 pub trait NormalDistribution: Copy + Send + Sync {
     /// The roughness along x and y.
@@ -44,6 +55,13 @@ pub trait NormalDistribution: Copy + Send + Sync {
 
     /// σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets facing `w`.
     fn sigma<F: SimdFloat>(&self, w: Vectors<F>) -> F;
+
+    /// (1 − E)/E, where E is the albedo toward the cosine `cos_theta_o` with F = 1: what is scattered more than once, as a
+    /// multiple of what is scattered once. 0 if E is not known.
+    #[inline(always)]
+    fn repeated<F: SimdFloat>(&self, _masking: Masking, cos_theta_o: F) -> F {
+        cos_theta_o.splat(0.0)
+    }
 
     /// Draws a normal, of any length, for each viewer `wo`.
     fn sample_normals<F: SimdFloat>(&self, wo: Vectors<F>, u: [F; 2]) -> Vectors<F>;
@@ -59,17 +77,27 @@ pub struct Microfacet<D> {
     normals: D,
     fresnel: Fresnel,
     masking: Masking,
+    /// Multiple for GGX alone, whose albedo is known.
+    pub(super) scattering: Scattering,
 }
 
 impl<D: NormalDistribution> Microfacet<D> {
     /// Creates the lobe with a distribution of normals. The reflectance is clamped to the range that the Fresnel
     /// formulas accept.
     pub fn with_normals(normals: D, fresnel: Fresnel, masking: Masking) -> Self {
-        Self { normals, fresnel: fresnel.in_range(), masking }
+        Self { normals, fresnel: fresnel.in_range(), masking, scattering: Scattering::Single }
     }
 
     pub(super) fn alpha(&self) -> [f32; 2] {
         self.normals.alpha()
+    }
+
+    /// 1 + F0 (1 − E)/E, the factor on the lobe for what is scattered more than once.
+    #[inline(always)]
+    fn compensation<F: SimdFloat>(&self, cos_theta_o: F) -> Colors<F> {
+        let repeated = self.normals.repeated(self.masking, cos_theta_o);
+        let one = repeated.splat(1.0);
+        Colors::splat(one, self.fresnel.eval(1.0)).map(|f0| one + f0 * repeated)
     }
 
     /// D G₂/(4 cos θ_o), the lobe without the Fresnel factor, and the density.
@@ -89,7 +117,11 @@ impl<D: NormalDistribution> Microfacet<D> {
 
 /// G₂ cos θ_i / (4 cos θ_i cos θ_o) of the cosines and projected areas of `wo` and `wi`.
 #[inline(always)]
-fn masked<F: SimdFloat>(masking: Masking, [cos_o, sigma_o]: [F; 2], [cos_i, sigma_i]: [F; 2]) -> F {
+pub(super) fn masked<F: SimdFloat>(
+    masking: Masking,
+    [cos_o, sigma_o]: [F; 2],
+    [cos_i, sigma_i]: [F; 2],
+) -> F {
     let below = match masking {
         Masking::Separable => sigma_o * sigma_i,
         Masking::Correlated => sigma_o * cos_i + sigma_i * cos_o - cos_i * cos_o,
@@ -104,7 +136,12 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
         let (geometry, pdf) = self.geometry_pdf(wo, wi, h);
         let cos_d = pdf.splat(0.5) * h.length_squared().sqrt();
         let geometry = where_above(wo, wi, geometry);
-        (self.fresnel.eval_lanes(cos_d).scaled(geometry), where_above(wo, wi, pdf))
+        let fresnel = self.fresnel.eval_lanes(cos_d);
+        let fresnel = match self.scattering {
+            Scattering::Single => fresnel,
+            Scattering::Multiple => fresnel.zip(self.compensation(wo.z), |f, factor| f * factor),
+        };
+        (fresnel.scaled(geometry), where_above(wo, wi, pdf))
     }
 
     #[inline(always)]
@@ -129,7 +166,11 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
                 * self.fresnel.max_from(ring.min_cos_d)
                 * masked(self.masking, [wo.z, sigma_o], [z, sigma_i])
         };
-        rings(wo, ax.max(ay)).map(bound).fold(0.0, f32::max) * ROUNDING
+        let factor = match self.scattering {
+            Scattering::Single => 1.0,
+            Scattering::Multiple => self.compensation(wo.z).single().max_component(),
+        };
+        rings(wo, ax.max(ay)).map(bound).fold(0.0, f32::max) * factor * ROUNDING
     }
 
     /// The Fresnel reflectance at `cos_theta_o`.

@@ -18,12 +18,12 @@
 //! # Ok::<(), domelight::bsdf::ParseMaterialError>(())
 //! ```
 //!
-//! All lobes but [`Coat`] are reciprocal: f_r(wo, wi) = f_r(wi, wo). (What glTF's coat reflects, and what a coat or sheen
-//! leaves to the layer below, depends on the angle of `wo`, as in the specification.) Constructors clamp every parameter to
+//! Lobes are reciprocal, f_r(wo, wi) = f_r(wi, wo), but for [`Coat`] and for multiple scattering ([`Scattering`]). (What
+//! glTF's coat reflects, and what a coat or sheen leaves to the layer below, depends on the angle of `wo`, as in the
+//! specification.) Constructors clamp every parameter to
 //! the range in which the formulas are valid, so no lobe evaluates to NaN or infinity.
 //!
-//! Rejected: trait objects (the set is closed, and the sample loop should inline); tabulated
-//! energy compensation (its tables would have to enter the bounds of [`Brdf::max_eval`]).
+//! Rejected: trait objects (the set is closed, and the sample loop should inline).
 
 mod beckmann;
 mod coat;
@@ -52,7 +52,7 @@ pub use lambert::Lambert;
 pub use lobe_summary::{GlossyLobe, LobeSummary};
 pub use lobes::{Bsdf, Lobe, MAX_LOBES, TooManyLobes};
 pub use metallic_roughness::MetallicRoughness;
-pub use microfacet::{Masking, Microfacet, NormalDistribution};
+pub use microfacet::{Masking, Microfacet, NormalDistribution, Scattering};
 pub use parse::{MaterialSpec, ParseMaterialError};
 pub use phong::Phong;
 pub use range::{MAX_ALPHA, MAX_EXPONENT, MIN_ALPHA};
