@@ -192,6 +192,31 @@ fn views_frame_the_subject_and_light_is_turned_to_them() {
     refused(&lights, 2, &["--env-rotate auto", "degrees"]);
 }
 
+/// A triangle at UTM coordinates, and a camera that is given in them, make the picture of the same near the origin.
+#[test]
+fn cameras_of_far_scenes_are_in_the_coordinates_of_the_file() {
+    let folder = folder();
+    let far = "v 448261.25 5411932.5 320\nv 448263.25 5411932.5 320\nv 448262.25 5411934.5 320\nf 1 2 3\n";
+    fs::write(folder.path().join("near.obj"), TRIANGLE).unwrap();
+    fs::write(folder.path().join("far.obj"), far).unwrap();
+    let picture = |scene: &str, camera: [&str; 2]| {
+        let view =
+            ["--origin", camera[0], "--target", camera[1], "--env", "sky", "--strategy", "mis"];
+        let output = [scene, "--json", "-q", "-o", "x.pfm"];
+        let report = json(&render(&folder, &[&output[..], &view].concat()));
+        (load(&folder, "x.pfm"), report["settings"].clone())
+    };
+    let (near, of_near) = picture("near.obj", ["0.5,1,6", "0,1,0"]);
+    let (far, of_far) = picture("far.obj", ["448262.75,5411933.5,326", "448262.25,5411933.5,320"]);
+    let errors = near.pixels.iter().zip(&far.pixels).map(|(a, b)| (*a - *b).luminance().abs());
+    let worst = errors.fold(0.0, f32::max);
+    assert!(worst < 1e-2, "{worst}");
+    assert_eq!(of_near["camera"]["origin"], serde_json::json!([0.5, 1.0, 6.0]));
+    assert_eq!(of_far["camera"]["origin"], serde_json::json!([448_262.75, 5_411_933.5, 326.0]));
+    let warning = of_far["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("large coordinates"), "{warning}");
+}
+
 /// The frames of a turntable are the pictures of a camera that goes around, and some of them are the same as all.
 #[test]
 fn a_turntable_goes_around_in_numbered_frames() {
@@ -318,7 +343,6 @@ fn flags_that_contradict_are_usage_errors() {
         2,
         &["--rays", "--strategy NAME:rays="],
     );
-    refused(&render(&folder, &["--display=127.0.0.1:9"]), 1, &["127.0.0.1:9", "tev"]);
     refused(&render(&folder, &["--size", "0x4"]), 2, &["0x4", "800x600"]);
     refused(&render(&folder, &["--material", "velvet"]), 2, &["velvet", "ggx:"]);
     refused(&render(&folder, &["-o", "picture.bmp"]), 2, &["picture.bmp", ".exr"]);
