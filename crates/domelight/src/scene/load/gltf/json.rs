@@ -223,15 +223,15 @@ pub(super) struct Accessor {
     pub(super) shape: String,
     pub(super) sparse: Option<Sparse>,
     #[serde(default)]
-    min: serde_json::Value,
+    min: Value,
     #[serde(default)]
-    max: serde_json::Value,
+    max: Value,
 }
 
 impl Accessor {
     /// The smallest and the largest value of each of three components, as the file gives them, if it does.
     pub(super) fn range(&self) -> Option<[[f64; 3]; 2]> {
-        let numbers = |value: &serde_json::Value| {
+        let numbers = |value: &Value| {
             let [x, y, z] = value.as_array()?.as_slice() else { return None };
             Some([x.as_f64()?, y.as_f64()?, z.as_f64()?])
         };
