@@ -46,8 +46,12 @@ fn text(numbers: DVec3) -> String {
 
 fn obj(center: DVec3) -> String {
     let mut obj = String::new();
-    corners().iter().for_each(|c| writeln!(obj, "v {}", text(*c + center)).unwrap());
-    FACES.iter().for_each(|f| writeln!(obj, "f {} {} {}", f[0] + 1, f[1] + 1, f[2] + 1).unwrap());
+    for c in corners() {
+        writeln!(obj, "v {}", text(c + center)).unwrap();
+    }
+    for [a, b, c] in FACES {
+        writeln!(obj, "f {} {} {}", a + 1, b + 1, c + 1).unwrap();
+    }
     obj
 }
 
@@ -64,12 +68,11 @@ fn ply(center: DVec3, format: &str) -> Vec<u8> {
         }
     }
     for [a, b, c] in FACES {
-        match format {
-            "ascii" => ply.extend(format!("3 {a} {b} {c}\n").bytes()),
-            _ => {
-                ply.push(3);
-                ply.extend([a, b, c].iter().flat_map(|&i| (i as i32).to_be_bytes()));
-            }
+        if format == "ascii" {
+            ply.extend(format!("3 {a} {b} {c}\n").bytes());
+        } else {
+            ply.push(3);
+            ply.extend([a, b, c].iter().flat_map(|&i| (i as i32).to_be_bytes()));
         }
     }
     ply
@@ -77,8 +80,12 @@ fn ply(center: DVec3, format: &str) -> Vec<u8> {
 
 fn off(center: DVec3) -> String {
     let mut off = "OFF\n6 8 0\n".to_owned();
-    corners().iter().for_each(|c| writeln!(off, "{}", text(*c + center)).unwrap());
-    FACES.iter().for_each(|[a, b, c]| writeln!(off, "3 {a} {b} {c}").unwrap());
+    for c in corners() {
+        writeln!(off, "{}", text(c + center)).unwrap();
+    }
+    for [a, b, c] in FACES {
+        writeln!(off, "3 {a} {b} {c}").unwrap();
+    }
     off
 }
 
@@ -86,7 +93,9 @@ fn stl(center: DVec3) -> String {
     let mut stl = "solid a\n".to_owned();
     for face in FACES {
         stl += "facet normal 0 0 0\nouter loop\n";
-        face.iter().for_each(|&i| writeln!(stl, "vertex {}", text(corners()[i] + center)).unwrap());
+        for i in face {
+            writeln!(stl, "vertex {}", text(corners()[i] + center)).unwrap();
+        }
         stl += "endloop\nendfacet\n";
     }
     stl + "endsolid a\n"
@@ -168,11 +177,9 @@ fn scenes_near_the_origin_keep_their_coordinates() {
 #[test]
 fn nodes_of_gltf_are_composed_in_double_precision() {
     let place = DVec3::new(4_156_000.25, 672_000.125, 4_775_000.5);
-    let nodes = format!(
-        r#"{{"translation":[4156000,672000,4775000],"children":[1,2]}},
-{{"mesh":0,"translation":[0.25,0.125,0.5]}},{{"camera":0,"translation":[0.25,0.125,10.5]}}"#
-    );
-    let loaded = Folder::new().with("a.gltf", gltf(&nodes, "")).load("a.gltf");
+    let nodes = r#"{"translation":[4156000,672000,4775000],"children":[1,2]},
+{"mesh":0,"translation":[0.25,0.125,0.5]},{"camera":0,"translation":[0.25,0.125,10.5]}"#;
+    let loaded = Folder::new().with("a.gltf", gltf(nodes, "")).load("a.gltf");
     check_far(&loaded, place, "nodes");
     let description = &loaded.description;
     let camera = description.camera.unwrap();

@@ -64,10 +64,9 @@ impl Engine {
             Self::Three => [Vec3::Z, Vec3::Y, Vec3::X],
             // The center is +Z, its right half −X; cubes are looked up with the world direction.
             Self::Filament | Self::Godot => [Vec3::NEG_X, Vec3::Y, Vec3::NEG_Z],
-            // The world is left-handed; the center is +Z, its right half +X.
-            Self::Babylon => [Vec3::X, Vec3::Y, Vec3::NEG_Z],
-            // Panoramas face the camera's −Z; cubes are looked up with −z.
-            Self::Bevy => [Vec3::X, Vec3::Y, Vec3::NEG_Z],
+            // Babylon's world is left-handed; the center is +Z, its right half +X. In Bevy, panoramas face the camera's
+            // −Z, and cubes are looked up with −z.
+            Self::Babylon | Self::Bevy => [Vec3::X, Vec3::Y, Vec3::NEG_Z],
             // The world is left-handed with +Z up; the center is +X, its right half +Y.
             Self::Unreal => [Vec3::NEG_Z, Vec3::X, Vec3::Y],
         };
