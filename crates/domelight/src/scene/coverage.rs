@@ -5,7 +5,7 @@
 //!
 //! A camera ray hits a surface with a probability equal to its coverage. Each triangle along the ray has its own random
 //! number, so that the transmittances of several layers multiply. A covered point of a transmissive surface is hit with
-//! probability p = max(r/(r + t), ¼), where r is about what it reflects and emits and t the luminance of T; the sample's
+//! probability p = max(r/(r + t), ¼), where r ≥ 0.1 is about what it reflects and emits and t the luminance of T; the sample's
 //! weight is 1/p if the surface is hit, and T/(1 − p) if not. So a surface before even surroundings contributes the same
 //! to a sample that hits it as to one that passes. A shadow ray multiplies the transmittances of all surfaces along it,
 //! without noise, using the mean of T's channels at normal incidence.
@@ -103,6 +103,9 @@ const TOGETHER: usize = 16;
 /// The minimum probability with which a camera ray hits a transmissive surface. It reflects only a few percent of the
 /// light, but that may include a sun.
 const LEAST_REFLECTED: f32 = 0.25;
+
+/// What a surface at least counts as contributing, because what it reflects may be brighter than what is behind it.
+const LEAST_CONTRIBUTION: f32 = 0.1;
 
 /// How a camera ray interacts with a surface that is not opaque.
 #[derive(Clone, Copy, Debug)]
@@ -449,7 +452,7 @@ impl Scene {
 /// The probability that a camera ray hits a transmissive surface of some coverage: the share of what the surface
 /// contributes, its coverage times `contribution`, in all that is seen, under even light.
 fn meeting_probability(contribution: f32, coverage: f32, through: Rgb) -> f32 {
-    let (met, passed) = (coverage * contribution, through.luminance());
+    let (met, passed) = (coverage * contribution.max(LEAST_CONTRIBUTION), through.luminance());
     if passed <= 0.0 {
         return 1.0;
     }
