@@ -14,7 +14,12 @@ use super::value::{Choice, Text};
 pub struct Tone {
     /// Exposure of pictures for viewing, in stops; auto exposes by the light of a render, and maps the median of
     /// other pictures to middle gray [default: auto; 0 for differences]
-    #[arg(id = "output.exposure", long = "exposure", value_name = "EV|auto")]
+    #[arg(
+        id = "output.exposure",
+        long = "exposure",
+        value_name = "EV|auto",
+        allow_negative_numbers = true
+    )]
     pub exposure: Option<Text<Exposure>>,
     /// Tone curve of pictures for viewing; agx is Blender's, standard clips at 1 [default: agx; standard for
     /// differences]
