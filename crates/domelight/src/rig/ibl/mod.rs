@@ -8,7 +8,7 @@
 //! # What is exact
 //! Each texel is the integral over *all* texels of the map, whose radiance is constant over their exact solid angles:
 //! nothing is sampled, so a sun of one texel makes neither fireflies nor rings. A hierarchy over the texels
-//! ([`gather`]) stops where the lobe is nearly a polynomial over the rest. The tests hold every texel within 0.5 % of
+//! (`gather.rs`) stops where the lobe is nearly a polynomial over the rest. The tests hold every texel within 0.5 % of
 //! quadrature over all texels, or within 0.5 % of 10⁻⁵ of the map's mean radiance if that is more. Level 0, which a
 //! mirror shows, is the mean of the map over each texel's solid angle.
 //!
