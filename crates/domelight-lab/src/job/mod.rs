@@ -3,6 +3,11 @@
 //! Each option is one field of one of these structs: its name, type, range, default, unit and line of help stand there and
 //! nowhere else. The command line, TOML, JSON and the JSON Schema are made from them.
 
+#![allow(
+    rustdoc::broken_intra_doc_links,
+    reason = "the comments on fields are the help of the command line, which has units in brackets"
+)]
+
 mod file;
 mod light;
 mod output;
