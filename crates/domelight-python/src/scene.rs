@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::str::FromStr as _;
 use std::sync::Arc;
 
-use domelight::environment::io::ProbeOptions;
 use domelight::environment::UpAxis;
+use domelight::environment::io::ProbeOptions;
 use domelight::geometry::{Aabb, Mesh};
 use domelight::math::{DVec3, Vec2, Vec3};
 use domelight::picture::MAX_TEXELS;

@@ -171,10 +171,7 @@ impl Engine {
         let camera = Camera::new(&view, width, height).map_err(error)?;
         let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
         let hit = scene.camera_hit(&ray, 0, 0);
-        Ok(hit.map(|hit| Picked {
-            at: scene.shading_point(&ray, &hit),
-            scene: scene.clone(),
-        }))
+        Ok(hit.map(|hit| Picked { at: scene.shading_point(&ray, &hit), scene: scene.clone() }))
     }
 
     /// A strategy with what a pilot chooses for one point.

@@ -5,9 +5,9 @@ use std::rc::Rc;
 use std::str::FromStr;
 
 use domelight::bsdf::{Bsdf, MaterialSpec};
+use domelight::environment::UpAxis;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, probe_from_bytes};
-use domelight::environment::{Environment, UpAxis};
 use domelight::math::Vec3;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
