@@ -56,6 +56,11 @@ def assert_same(film, path):
         assert np.array_equal(values.view(np.uint32), expected.view(np.uint32)), name
 
 
+def without_job(attributes):
+    """What only the program knows is the way to render the picture again: Python's scenes may be arrays."""
+    return {name: value for name, value in attributes.items() if name not in ("domelight.job", "domelight.inputs")}
+
+
 def test_every_strategy_is_covered():
     names = {name for name, _ in dl.strategy_names()}
     assert names == {text.split(":")[0] for text in STRATEGIES}
@@ -71,11 +76,10 @@ def test_films_equal_the_programs(program, tmp_path, strategy):
     env = dl.Environment.builtin("cathedral", rows=128)
     film = dl.render(scene, env, strategy, spp=8, size=(48, 40), seed=5)
     assert_same(film, path)
-    # What Python writes is that, too: layers and attributes, byte by byte.
+    # What Python writes is that, too: layers and attributes.
     film.save(tmp_path / "python.exr")
     assert_same(film, tmp_path / "python.exr")
-    assert attributes(tmp_path / "python.exr") == attributes(path)
-    assert (tmp_path / "python.exr").read_bytes() == path.read_bytes()
+    assert attributes(tmp_path / "python.exr") == without_job(attributes(path))
     # The pilot's choices are in the strategy's text.
     assert film == dl.render(scene, env, film.strategy, spp=8, size=(48, 40), seed=5)
 
@@ -123,7 +127,7 @@ def test_files_equal_the_programs(program, tmp_path, monkeypatch):
         bytes_of = lambda who: (tmp_path / f"{who}.{extension}").read_bytes()
         assert bytes_of("python") == bytes_of("program"), extension
     film.save(tmp_path / "python.exr")
-    assert attributes(tmp_path / "python.exr") == attributes(tmp_path / "program.exr")
+    assert attributes(tmp_path / "python.exr") == without_job(attributes(tmp_path / "program.exr"))
     # Pictures name no folder of this machine.
     film = dl.render(dl.Scene.load(tmp_path / mesh), dl.Environment.load(tmp_path / probe), spp=1, size=(8, 8))
     film.save("absolute.exr")
