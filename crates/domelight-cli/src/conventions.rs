@@ -1,4 +1,4 @@
-//! `domelight conventions`: how other programs hang a lat-long map.
+//! `domelight conventions`: how other programs orient a lat-long map.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::args::ConventionsArguments;
 use crate::output::{PictureFormat, print, print_json, require_one_on_standard_output};
 
-/// A program, and how it hangs a map.
+/// A program, and how it orients a map.
 #[derive(Serialize)]
 struct Row {
     program: &'static str,

@@ -85,8 +85,11 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let automatic = automatic_exposure(scene, camera, environment, settings);
     let mut made = job.clone();
     made.sampling.strategy.0 = spec.into();
+    // Only OpenEXR holds the job; its inputs are read once more for their fingerprints.
+    let keeps_job = arguments.render_run.saves() || outputs.iter().any(PicturePath::has_all_layers);
+    let attributes = || job::attributes(&made, &arguments.job.scene);
     let described = Settings {
-        job: job::attributes(&made, &arguments.job.scene),
+        job: keeps_job.then(attributes).unwrap_or_default(),
         scene: report.clone(),
         strategy: spec.description(),
         spp: settings.n_samples,

@@ -62,10 +62,14 @@ impl RenderRunArguments {
         self.shard.is_some() || self.tiles.is_some()
     }
 
+    /// Whether the state of the render is saved.
+    pub(crate) fn saves(&self) -> bool {
+        self.is_part() || self.checkpoint.is_some() || self.resume.is_some()
+    }
+
     /// The exit code of a render that is interrupted before its first sample: a farm runs a shard again.
     pub(crate) fn code_of_an_early_end(&self) -> i32 {
-        let saves = self.is_part() || self.checkpoint.is_some() || self.resume.is_some();
-        if saves { interrupt::RUN_AGAIN } else { interrupt::ENDED }
+        if self.saves() { interrupt::RUN_AGAIN } else { interrupt::ENDED }
     }
 
     /// Checks the flags against the outputs before the work.

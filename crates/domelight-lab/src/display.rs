@@ -2,7 +2,7 @@
 //!
 //! Both listen for tev's messages on a TCP port, little endian, strings ended by NUL: the length of the message, a byte for
 //! its kind, and its content (`Ipc.h` of tev). A thread sends them. Tiles that wait are replaced by newer ones, so neither a
-//! slow viewer nor one that never reads holds up the render; one that is gone is told once.
+//! slow viewer nor one that never reads holds up the render.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write as _};
@@ -58,7 +58,7 @@ impl Display {
     /// Connects to the viewer at `address` and opens a picture named `name` of that size.
     ///
     /// # Errors
-    /// If the address is none, or nothing listens there.
+    /// If the address is invalid, or nothing listens there.
     pub fn connect(address: &str, name: &str, [width, height]: [usize; 2]) -> io::Result<Self> {
         let mut addresses = address.to_socket_addrs()?;
         let address = addresses.next().ok_or(io::ErrorKind::AddrNotAvailable)?;

@@ -113,8 +113,8 @@ impl Point {
 }
 
 impl CameraReport {
-    /// The report of a camera in a scene with an offset ([`offset`](domelight::scene::SceneDescription::offset)), in the coordinates of its file,
-    /// and of what its lens blurs.
+    /// The report of a camera and of what its lens blurs, in the coordinates of the scene's file: `offset` is that of the
+    /// [description](domelight::scene::SceneDescription::offset).
     pub fn new(view: &CameraSettings, offset: DVec3, dof: Option<DepthOfField>) -> Self {
         let (fov, ortho) = match view.projection {
             Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),

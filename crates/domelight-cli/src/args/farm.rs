@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::parser::ValueSource;
 use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 
-use domelight_lab::job::{Job, Tone};
+use domelight_lab::job::{Job, Pixel, Sampling, SceneSettings, Tone};
 
 use super::{MemoryArguments, ThreadArguments};
 use crate::output::PicturePath;
@@ -79,9 +79,11 @@ pub(crate) struct JobWords {
 }
 
 impl JobWords {
-    /// The arguments of `render` that are passed to jobs unchanged.
+    /// The arguments of `render` that are passed to jobs unchanged. The merge develops the picture.
     fn render_command() -> Command {
-        MemoryArguments::augment_args(Job::augment_args(Command::new("render")))
+        let command = SceneSettings::augment_args(Command::new("render"));
+        let command = Pixel::augment_args(Sampling::augment_args(command));
+        MemoryArguments::augment_args(command)
     }
 }
 

@@ -127,7 +127,7 @@ pub(crate) enum Command {
     /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
     #[command(after_help = figures::EXAMPLES)]
     Figures(Box<figures::FiguresArguments>),
-    /// List how other programs hang a lat-long map in their world, or write a map that shows it.
+    /// List how other programs orient a lat-long map, or write a map that shows it.
     #[command(after_help = CONVENTIONS_EXAMPLES)]
     Conventions(ConventionsArguments),
     /// Print the JSON Schema of jobs: of scene files that say how to render, and of what a picture says of itself.
@@ -152,10 +152,10 @@ Examples:
   domelight probe studio.hdr --for three -o studio-three.hdr
       a map that stands in three.js as it stands here";
 
-/// List how other programs hang a map.
+/// List how other programs orient a map.
 #[derive(Args, Debug)]
 pub(crate) struct ConventionsArguments {
-    /// Write a map that shows how it hangs: a dot in each of 26 directions, the names of the axes as they read from
+    /// Write a map that shows how it is oriented: a dot in each of 26 directions, the names of the axes as they read from
     /// inside, and a sun of one texel (.exr, .hdr, .pfm, .png; - writes OpenEXR to standard output)
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PicturePath>,

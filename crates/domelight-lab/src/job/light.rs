@@ -28,8 +28,8 @@ pub struct Light {
     /// - reads standard input) [default: the scene's, otherwise sky]
     #[arg(id = "light.map", long = "env", value_name = "PROBE")]
     pub map: Option<String>,
-    /// Program whose world the scene comes from: the map stands as it does there (domelight conventions lists what that
-    /// means) [default: -Z, or +Y with the map's top toward +Z, sees the center of the map]
+    /// Program that the scene comes from: the map is oriented as in that program (domelight conventions lists how)
+    /// [default: the map's center is toward -Z, or toward +Y if its top is toward +Z]
     #[arg(id = "light.convention", long = "env-convention", value_name = "PROGRAM")]
     pub convention: Option<Choice<Convention>>,
     /// Rotate the environment about the up axis, counterclockwise as seen from above [degrees]; with a

@@ -221,7 +221,7 @@ impl Job {
     /// This job with the options that are `given` in `other` instead. An option that contradicts one of them goes.
     ///
     /// # Errors
-    /// If the result is none.
+    /// If the given options and the rest of the job contradict each other.
     pub fn with(&self, other: &Self, given: &Given) -> Result<Self, JobError> {
         let command = Self::augment_args(Command::new("job"));
         let (mut this, other) = (fields(self), fields(other));

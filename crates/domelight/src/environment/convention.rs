@@ -1,4 +1,4 @@
-//! How other programs hang a lat-long map in their world.
+//! How other programs orient a lat-long map.
 //!
 //! Programs agree that the top row is up. They differ in the direction of the center column, and in whether the map is
 //! seen from inside the sphere, as a photograph is, or from outside, mirrored. A scene that comes from a program in its
@@ -10,7 +10,7 @@ use std::str::FromStr;
 use crate::math::{TAU, functions};
 use crate::{Rgb, RgbImage};
 
-/// A program, and how it hangs a lat-long map.
+/// A program, and how it orients a lat-long map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Convention {
     /// Blender's world and Cycles.
@@ -232,7 +232,7 @@ impl fmt::Display for Convention {
     }
 }
 
-/// A map that shows how it hangs: the sphere in a gradient, a dot of its own color in each of 26 directions, the names of
+/// A map that shows how it is oriented: the sphere in a gradient, a dot of its own color in each of 26 directions, the names of
 /// the six axes as they read from inside, and a sun of one texel to the upper right of −Z. In domelight's world, +Y up.
 ///
 /// # Panics
