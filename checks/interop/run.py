@@ -189,7 +189,7 @@ def check_domelight(table, rigs):
     camera += ["--material", "diffuse:1", "--hide-env"]
     for rig, light, expected in [
         (lamps, ["--strategy", "mis", "--spp", "1024"], "discs"),
-        (rigs["regions"], ["--strategy", "variance-minimization", "--lights", "16", "--spp", "64"], "parallel"),
+        (rigs["regions"], ["--strategy", "variance-minimization:lights=16", "--spp", "64"], "parallel"),
     ]:
         _, _, rotation = RIGS[rig.name]
         for view, side in reference.VIEWS.items():
