@@ -20,8 +20,10 @@ const parts = {
   MAIN: inScript(await bundle("src/main.ts")),
   WORKER: inScript(await bundle("src/worker.ts")),
   ENGINE: packed,
+  // Where the page will be, for the links that people copy from it: BASE=https://… web/build
+  BASE: (process.env.BASE ?? "").replaceAll("&", "&amp;").replaceAll('"', "&quot;"),
 };
-const page = text("src/index.html").replace(/@(STYLE|MAIN|WORKER|ENGINE)@/g, (_, name) => parts[name]);
+const page = text("src/index.html").replace(/@(STYLE|MAIN|WORKER|ENGINE|BASE)@/g, (_, name) => parts[name]);
 mkdirSync(new URL("dist", import.meta.url), { recursive: true });
 writeFileSync(new URL("dist/domelight.html", import.meta.url), page);
 const kilobytes = (n) => `${Math.round(n / 1000)} kB`;

@@ -47,22 +47,51 @@ export class App {
   /** The drops that the engines hold, and the drops with measured memory use. */
   private provided: App["drops"] | null = null;
   private measured: App["drops"] | null = null;
+  /** Whether another page shows a step of the lecture alone: `?embed=step`. */
+  readonly embeds = document.documentElement.dataset.embed === "step";
+  /** Counts the changes of the dropped files. */
+  revision = 0;
+  /** What the reference's engine holds. */
+  private held: { host: Host | null; drops: App["drops"] | null; scene: string; env: string; rotate: number } = { host: null, drops: null, scene: "", env: "", rotate: NaN };
   /** Whether to adopt the light of the next loaded scene. */
   private adopts = false;
 
   constructor(readonly engines: Engines) {
-    this.state = fromHash(location.hash);
+    this.state = this.fromAddress();
     engines.onRestart = () => {
       this.loaded = { scene: "", env: "", rotate: NaN };
       void this.provide().then(() => this.load());
     };
     addEventListener("hashchange", () => {
       if (location.hash.replace(/^#/, "") === toHash(this.state)) return;
-      this.state = fromHash(location.hash);
+      this.state = this.fromAddress();
       this.forgetError();
       this.emit("all");
       this.load();
     });
+  }
+
+  /** The state in the address; what is wrong there is said. */
+  private fromAddress(): State {
+    const { state, wrong } = fromHash(location.hash);
+    if (this.embeds) state.panel = "lecture";
+    this.tellWrong(wrong);
+    return state;
+  }
+
+  /** Shows which parts of a link are not understood. */
+  private tellWrong(parts: string[]) {
+    const notice = $("wrong");
+    notice.hidden = !parts.length;
+    const shortened = parts.map((part) => (part.length > 60 ? `${part.slice(0, 57)}…` : part));
+    notice.textContent = `This link has parts that this page does not know: ${shortened.join(", ")}. The defaults are shown in their place.`;
+  }
+
+  /** Replaces a part of the state that the engine refuses by its default. */
+  replace(key: "strategy" | "beside", error: string) {
+    this.tellWrong([`${key}=${this.state[key]} (${error})`]);
+    this.set({ [key]: DEFAULT[key] });
+    $("wrong").hidden = false;
   }
 
   on(listener: (what: Change) => void) {
@@ -77,6 +106,7 @@ export class App {
   set(change: Partial<State>, what: Change = "render") {
     Object.assign(this.state, change);
     this.forgetError();
+    $("wrong").hidden = true;
     // The browser's Back leads to the last panel or step.
     const hash = `#${toHash(this.state)}`;
     if (("panel" in change || "step" in change) && hash !== location.hash) history.pushState(null, "", hash);
@@ -141,7 +171,8 @@ export class App {
   private async loadWhatFits(): Promise<Change> {
     const { engines } = this, all = engines.hosts.length;
     const bytes = this.contents().reduce((sum, { bytes }) => sum + bytes.length, 0);
-    const isSmall = all * (ENGINE_MEMORY + DECODED * bytes) <= engines.memory;
+    // One engine more renders references.
+    const isSmall = (all + 1) * (ENGINE_MEMORY + DECODED * bytes) <= engines.memory;
     const isMeasured = isSmall || this.measured === this.drops;
     const fresh = engines.use(isSmall ? all : isMeasured ? engines.active : 1);
     if (fresh.length) this.loaded = { scene: "", env: "", rotate: NaN };
@@ -219,6 +250,7 @@ export class App {
     Object.assign(state, { scene, material, camera, pixel, env, rotate, ev, scale, exposure });
     this.files = good.files;
     this.drops = good.drops;
+    this.revision++;
     this.loaded = { ...good.loaded };
     await this.provide();
     this.emit("files");
@@ -232,6 +264,22 @@ export class App {
     status.classList.toggle("error", isError);
   }
 
+  /** Copies text, and says so. */
+  async copy(text: string, told: string) {
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      // Without clipboard permission, use the legacy command.
+      const area = document.createElement("textarea");
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+    this.tell(told);
+  }
+
   /** Tells the progress of a render, which does not replace an error. */
   progress(text: string) {
     if (!$("status").classList.contains("error")) this.tell(text);
@@ -242,14 +290,24 @@ export class App {
     $("status").classList.remove("error");
   }
 
-  /** An engine for a reference, with the loaded scene and light. */
+  /** An engine for references, with the loaded scene and light. */
   async reference(): Promise<Host> {
-    const [host, isNew] = this.engines.reference();
-    if (isNew && this.loaded.scene && this.loaded.env) {
-      const { scene, env, rotate } = this.loaded;
-      // Send all calls first: an engine answers in order.
-      const files = this.contents().map(({ path, bytes }) => host.call("addFile", path, bytes));
-      await Promise.all([...files, host.call("loadScene", scene), host.call("loadEnvironment", withTurn(env, rotate))]);
+    const { scene, env, rotate } = this.loaded;
+    if (!scene || !env) throw new Error("the scene is not loaded");
+    const host = this.engines.reference();
+    const before = this.held.host === host ? this.held : { drops: null, scene: "", env: "", rotate: NaN };
+    this.held = { host, drops: this.drops, scene, env, rotate };
+    const isSame = before.drops === this.drops;
+    // Send all calls first: an engine answers in order.
+    const calls: Promise<unknown>[] = isSame ? [] : [host.call("clearFiles"), ...this.contents().map(({ path, bytes }) => host.call("addFile", path, bytes))];
+    if (!isSame || before.scene !== scene) calls.push(host.call("loadScene", scene));
+    if (!isSame || before.env !== env) calls.push(host.call("loadEnvironment", withTurn(env, rotate)));
+    else if (before.rotate !== rotate) calls.push(host.call("turnEnvironment", rotate));
+    try {
+      await Promise.all(calls);
+    } catch (error) {
+      this.held.host = null;
+      throw error;
     }
     return host;
   }
@@ -288,6 +346,7 @@ export class App {
     }
     const contents = await Promise.all(files.map(async ({ path, file }) => ({ path, bytes: new Uint8Array(await file.arrayBuffer()) })));
     const { missing } = this;
+    this.revision++;
     // A dropped probe keeps the scene's files, and a dropped scene the probe's.
     this.drops = { scene: scenes.length ? contents : this.drops.scene, probe: probes.length ? contents : this.drops.probe };
     this.files = { scenes: scenes.length ? scenes : this.files.scenes, probes: probes.length ? probes : this.files.probes };

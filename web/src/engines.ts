@@ -1,5 +1,6 @@
 // The Workers, one engine each.
 
+import { Passes } from "./passes";
 import type { Arguments, Call, FromWorker, Result, Statistics, ToWorker, Update } from "./protocol";
 
 /** The first Worker, and the engine's module that it unpacks from the page. */
@@ -129,8 +130,27 @@ export class Job {
   private progressOf = new Map<Host, number>();
   paused = false;
   ended = false;
+  /** Whether the engines know where to stop, and those that have stopped there. */
+  budgeted = false;
+  private spent = new Set<Host>();
 
-  constructor(readonly token: number, readonly hosts: Host[], readonly settings: RenderSettings) {}
+  /** An engine has spent its budget or all samples; returns whether that ends the job. */
+  spend(host: Host): boolean {
+    this.spent.add(host);
+    this.ended = this.spent.size === this.hosts.length;
+    return this.ended;
+  }
+
+  raysOf(host: Host): number {
+    return this.statisticsOf.get(host)?.shadowRays ?? 0;
+  }
+
+  /** The picture at whole passes. */
+  readonly passes: Passes;
+
+  constructor(readonly token: number, readonly hosts: Host[], readonly settings: RenderSettings) {
+    this.passes = new Passes(settings.width, settings.height, hosts.length);
+  }
 
   note(host: Host, update: Update) {
     this.statisticsOf.set(host, update.statistics);
@@ -139,7 +159,12 @@ export class Job {
   }
 
   get complete() {
-    return this.ended || this.hosts.every((host) => this.statisticsOf.get(host)?.complete);
+    return this.ended || this.isWhole;
+  }
+
+  /** Whether all samples are there, so that it did not end before. */
+  get isWhole() {
+    return this.hosts.every((host) => this.statisticsOf.get(host)?.complete);
   }
 
   get progress() {
@@ -170,7 +195,9 @@ export class Job {
 }
 
 export interface JobEvents {
-  update(job: Job, update: Update): void;
+  update(job: Job, host: Host, update: Update): void;
+  /** The job has spent its budget. */
+  ended(job: Job): void;
   failed(job: Job, error: string): void;
 }
 
@@ -178,7 +205,7 @@ export interface JobEvents {
 export class Engines {
   private nextToken = 1;
   private jobs: Job[] = [];
-  events: JobEvents = { update() {}, failed() {} };
+  events: JobEvents = { update() {}, ended() {}, failed() {} };
   onRestart: () => void = () => {};
 
   /** The number of engines that hold the scene; the others stay empty if memory is short. */
@@ -210,8 +237,7 @@ export class Engines {
 
   /** The engines that hold the scene. */
   get working(): Host[] {
-    const hosts = this.hosts.slice(0, this.active);
-    return this.beside ? [...hosts, this.beside] : hosts;
+    return this.hosts.slice(0, this.active);
   }
 
   /** Makes a call to all working engines, and returns the first engine's answer. */
@@ -252,14 +278,16 @@ export class Engines {
   private aside: Host | null = null;
   private beside: Host | null = null;
 
-  /** An extra engine that keeps the picture's scene and light, and whether it is new. */
-  reference(): [Host, boolean] {
-    const isNew = !this.beside;
+  /** An extra engine for references of the picture. */
+  reference(): Host {
     if (!this.beside) {
-      this.beside = this.another();
-      this.beside.onRestart = () => this.onRestart();
+      const host = (this.beside = this.another());
+      host.onRestart = () => {
+        host.end("the engine was restarted");
+        if (this.beside === host) this.beside = null;
+      };
     }
-    return [this.beside, isNew];
+    return this.beside;
   }
 
   /** An extra engine for the scenes of figures. */
@@ -274,6 +302,14 @@ export class Engines {
     next.hosts.forEach((host, k) =>
       host.send({ kind: "render", token: next.token, settings: JSON.stringify({ ...next.settings, shard: [k, next.hosts.length] }) }));
     return next;
+  }
+
+  /** Stops one of the pictures at a number of shadow rays. */
+  endAt(job: Job, rays: number) {
+    if (job.budgeted) return;
+    job.budgeted = true;
+    const now = job.statistics.shadowRays;
+    job.hosts.forEach((host) => host.send({ kind: "budget", token: job.token, rays: rays * job.raysOf(host) / Math.max(now, 1) }));
   }
 
   /** Stops one of the pictures in its current state. */
@@ -298,9 +334,10 @@ export class Engines {
     if (!job) return;
     if (message.kind === "started") job.strategy = message.strategy;
     if (message.kind === "failed") this.events.failed(job, message.error);
+    if (message.kind === "spent" && job.spend(host)) this.events.ended(job);
     if (message.kind === "update") {
       job.note(host, message);
-      this.events.update(job, message);
+      this.events.update(job, host, message);
     }
   }
 

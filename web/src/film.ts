@@ -3,6 +3,9 @@
 
 import { CURVES, ERROR_GLSL, GLSL, develop, errorColor, type Curve } from "./tone";
 
+/** The luminance of the pixel whose numbers begin at `i`. */
+export const luminance = (pixels: Float32Array, i: number) => 0.2126 * pixels[i] + 0.7152 * pixels[i + 1] + 0.0722 * pixels[i + 2];
+
 /** A picture of linear R, G, B and alpha. */
 export class Film {
   pixels: Float32Array;
@@ -26,6 +29,12 @@ export class Film {
         this.pixels.set(pixels.subarray(from, from + 4 * width), 4 * ((y + row) * this.width + x));
       }
     }
+  }
+
+  /** Averages the n-th of several pictures into the mean of those before. */
+  average(film: Film, n: number) {
+    const { pixels } = this;
+    for (let i = 0; i < pixels.length; i++) pixels[i] += (film.pixels[i] - pixels[i]) / n;
   }
 
   /** Copies another picture of any size, as a placeholder. */

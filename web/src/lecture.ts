@@ -1,11 +1,18 @@
 // The Lecture panel: sampling direct illumination step by step, with an interactive figure for each step.
 
 import type { App, Change } from "./app";
+import { article } from "./article";
 import { $, h } from "./dom";
 import { FIGURES } from "./figures";
+import { printHandout } from "./handout";
 import { onFigureWidth } from "./plot";
 import { Stage } from "./stage";
+import { addressOf, type State } from "./state";
 import { STEPS } from "./steps";
+
+/** HTML that shows the step with its figure in another page. */
+const embedding = (state: State) =>
+  `<iframe src="${addressOf(state, "?embed=step").replaceAll("&", "&amp;").replaceAll('"', "%22")}" title="${STEPS[state.step - 1].title}" width="100%" height="900" style="border:0"></iframe>`;
 
 export class Lecture {
   private shown = -1;
@@ -19,6 +26,9 @@ export class Lecture {
     }));
     app.on((what) => this.changed(what));
     $("present").addEventListener("click", () => this.present(true));
+    $("print-all").addEventListener("click", () => void printHandout(app, $<HTMLInputElement>("with-answers").checked));
+    $("copy-step").addEventListener("click", () => app.copy(addressOf(app.state), "Link copied"));
+    $("copy-embed").addEventListener("click", () => app.copy(embedding(app.state), "HTML copied"));
     addEventListener("keydown", (event) => this.key(event));
     document.addEventListener("fullscreenchange", () => { if (!document.fullscreenElement) this.present(false); });
     this.changed("all");
@@ -43,6 +53,7 @@ export class Lecture {
     document.documentElement.toggleAttribute("data-presenting", on);
     if (on) document.documentElement.requestFullscreen?.().catch(() => {});
     else if (document.fullscreenElement) void document.exitFullscreen();
+    this.stage?.redraw();
     $("step").scrollIntoView({ block: "start" });
   }
 
@@ -68,14 +79,12 @@ export class Lecture {
 
   private show(i: number) {
     this.shown = i;
-    const { title, text, formulas, question, answer } = STEPS[i];
     $("steps").querySelectorAll("a").forEach((link, k) => {
       if (k === i) link.setAttribute("aria-current", "step");
       else link.removeAttribute("aria-current");
     });
-    const place = h("div", { class: "figure", id: "figure" });
-    const formulaBox = h("div", { class: "formula", tabindex: "0", role: "group", "aria-label": "Formulas" });
-    formulaBox.innerHTML = formulas.map((formula) => `<math display="block">${formula}</math>`).join("");
+    const { elements, figure, answer } = article(i);
+    figure.id = "figure";
     const move = (name: string, k: number) => {
       const button = h("button", { type: "button" }, name);
       button.disabled = k < 0 || k >= STEPS.length;
@@ -87,14 +96,12 @@ export class Lecture {
       });
       return button;
     };
-    $("step").replaceChildren(
-      h("h2", { tabindex: "-1" }, title), ...text.map((paragraph) => h("p", {}, paragraph)), formulaBox, place,
-      h("div", { class: "question" }, h("p", {}, question), h("details", {}, h("summary", {}, "Answer"), h("p", {}, answer))),
-      h("div", { class: "steps" }, move("← Previous", i - 1), move("Next →", i + 1)));
+    $("step").replaceChildren(...elements, h("div", { class: "steps" }, move("← Previous", i - 1), move("Next →", i + 1)));
     // Figures need a map.
-    this.stage = this.app.probe ? new Stage(place, this.app, this.app.state.figure.split(";")) : null;
+    this.stage = this.app.probe ? new Stage(figure, this.app, this.app.state.figure.split(";"), answer) : null;
     if (this.stage) FIGURES[i](this.stage);
     document.documentElement.dataset.step = String(i + 1);
+    if (this.app.embeds && this.stage) document.documentElement.dataset.ready = "true";
   }
 }
 

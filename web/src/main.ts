@@ -7,9 +7,9 @@ import { Lecture } from "./lecture";
 import { LightsPanel } from "./lights";
 import { MapPanel } from "./map";
 import { PicturePanel } from "./picture";
+import { speakValues } from "./spoken";
+import { PANELS } from "./state";
 import { XrayPanel } from "./xray";
-
-const PANELS = ["picture", "map", "xray", "lights", "lecture"];
 
 /** The name of a browser feature that the page needs but lacks, or null. */
 function missing(): string | null {
@@ -28,23 +28,25 @@ async function main() {
     $("status").classList.add("error");
     return;
   }
+  // In another page, no other panels appear even for a moment.
+  if (new URLSearchParams(location.search).get("embed") === "step") document.documentElement.dataset.embed = "step";
   const app = new App(await Engines.create());
   const picture = new PicturePanel(app);
-  new MapPanel(app);
+  const map = new MapPanel(app);
   new XrayPanel(app);
   new LightsPanel(app);
   const lecture = new Lecture(app);
   wireTabs(app);
   wireDrop(app);
+  speakValues();
   app.on((what) => { if (what === "all") show(app); });
-  Object.assign(window, { domelight: { app, picture, lecture } });
+  Object.assign(window, { domelight: { app, picture, map, lecture } });
   show(app);
   app.load();
 }
 
 function show(app: App) {
-  const panel = PANELS.includes(app.state.panel) ? app.state.panel : "picture";
-  app.state.panel = panel;
+  const { panel } = app.state;
   for (const name of PANELS) {
     $(name).hidden = name !== panel;
     const tab = $(`tab-${name}`);

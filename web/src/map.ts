@@ -6,11 +6,14 @@ import { Film, FilmView } from "./film";
 import type { MapPicture } from "./protocol";
 import { MAPPINGS } from "./state";
 
-const WIDTH = 768, LAYER = 192;
+/** Columns of the map and of the layers over it; powers of two divide evenly into the engine’s cells. */
+const WIDTH = 768, LAYER = 256;
 /** Layers of the engine's `importance`, in their order. */
 const IMPORTANCE = ["light", "reflectance", "visibility", "environment", "brdf", "mis", "target"];
 /** The strategies whose rays the counted layers show. */
 const COUNTED: Record<string, string> = { product: "product:8", sir: "sir:2/32", rejection: "rejection:16" };
+/** What overlays that are no densities are integrals of, and their units. */
+const INTEGRALS: Record<string, [string, string]> = { reflectance: ["f · cos θ", ""], visibility: ["V", " sr"] };
 /** The duration of the samples' animation [ms]. */
 const ARRIVAL = 900;
 
@@ -18,6 +21,8 @@ export class MapPanel {
   private view = new FilmView($<HTMLCanvasElement>("map-film"), !new URLSearchParams(location.search).has("2d"));
   private exposed = "";
   private samples: Float32Array = new Float32Array();
+  /** What is known of the pixel: names and values. */
+  private found: [string, string][] = [];
   /** The number of samples shown so far. */
   private arrived = 0;
   /** The layers of `importance`, and one layer of counted rays with its settings. */
@@ -138,11 +143,11 @@ export class MapPanel {
   private readonly ask = latest(async () => {
     const { app } = this, { state } = app, pixel = app.pixel();
     $("map-hint").hidden = !!pixel;
-    const body = $("point-table").querySelector("tbody")!;
     if (!pixel) {
       this.samples = new Float32Array();
       this.layers = this.counted = null;
-      body.replaceChildren();
+      this.found = [];
+      this.tellLayer();
       this.mark();
       return;
     }
@@ -151,7 +156,7 @@ export class MapPanel {
       await this.countRays(pixel);
       this.samples = (await app.engines.call("samples", pixel, state.strategy, state.mapping, this.nSamples, state.seed)) as Float32Array;
       const point = JSON.parse(await app.engines.call("point", pixel)) as { shadowed: number; unshadowed: number } | null;
-      body.replaceChildren(...this.rows(point).map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value))));
+      this.found = this.rows(point);
     } catch (error) {
       app.tell((error as Error).message, true);
     }
@@ -173,8 +178,12 @@ export class MapPanel {
   });
 
   private tellLayer() {
-    const { layer, mapping } = this.app.state;
-    document.documentElement.dataset.layer = `${layer} ${mapping}`;
+    const { layer, mapping } = this.app.state, integral = this.layer()?.integral;
+    const [what, unit] = INTEGRALS[layer] ?? ["p", ""];
+    const found = integral === undefined ? this.found : [...this.found, [`The overlay’s integral, ∫ ${what} dω`, `${Number(integral.toPrecision(3)).toFixed(2)}${unit}`]];
+    $("point-table").querySelector("tbody")!.replaceChildren(...found.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value))));
+    // Another request may still count the layer's rays.
+    if (!layer || this.layer()) document.documentElement.dataset.layer = `${layer} ${mapping}`;
   }
 
   /** The strategy whose rays the chosen layer counts, if any. */
@@ -236,13 +245,13 @@ export class MapPanel {
     if ($<HTMLInputElement>("show-samples").checked) this.dots(context, 0, this.arrived);
   }
 
-  /** The layer overlaid on the map. */
-  private layer(): { values: Float32Array; width: number; height: number } | null {
+  /** The layer overlaid on the map, and its integral over the sphere. */
+  private layer(): { values: Float32Array; width: number; height: number; integral: number } | null {
     const { layers, counted } = this, at = IMPORTANCE.indexOf(this.app.state.layer);
-    if (this.countedStrategy && counted) return { ...counted.density, values: counted.density.pixels };
+    if (this.countedStrategy && counted) return { ...counted.density, values: counted.density.pixels, integral: counted.density.integrals[0] };
     if (at < 0 || !layers?.pixels.length) return null;
     const n = layers.width * layers.height;
-    return { ...layers, values: layers.pixels.subarray(at * n, (at + 1) * n) };
+    return { ...layers, values: layers.pixels.subarray(at * n, (at + 1) * n), integral: layers.integrals[at] };
   }
 
   /** A density as the opacity of one color. The square root makes tails visible; full opacity is at the 99th percentile

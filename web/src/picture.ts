@@ -3,11 +3,13 @@
 import type { App, Change } from "./app";
 import { $, color, count, degrees, fill, save, short, signed, stops, words } from "./dom";
 import { materialEditor, strategyEditor } from "./editors";
-import type { Camera, Job, RenderSettings } from "./engines";
+import type { Camera, Host, Job, RenderSettings } from "./engines";
+import { ErrorPlot, type Measured } from "./errors";
 import { Film, FilmView } from "./film";
-import { onFigureWidth, plot, slope, type Series } from "./plot";
+import { onFigureWidth } from "./plot";
+import type { Update } from "./protocol";
 import { Reference } from "./reference";
-import { PROBES, SCENES, command, commandWords, fileName, toHash } from "./state";
+import { DEFAULT, PROBES, SCENES, addressOf, command, commandWords, fileName, isBuiltinProbe } from "./state";
 import { CURVES, CURVE_NAMES, type Curve } from "./tone";
 
 type Vec = [number, number, number];
@@ -22,6 +24,12 @@ const turned = (v: number[], axis: number[], angle: number): Vec =>
 
 /** The edge length of the preview while the camera moves [pixels]. */
 const PREVIEW = 128;
+/** When a reference starts beside a picture that takes long [ms]. */
+const PATIENCE = 3000;
+/** Renders of a reference while the picture is not done. */
+const RENDERS_BEFORE = 4;
+/** At equal rays, the right picture may have this many more samples than expected, and is stopped before. */
+const SPARE = 1.04;
 /** The distances that zooming reaches [radii of the scene]. */
 const NEAREST = 1e-3, FARTHEST = 1e3;
 
@@ -30,6 +38,7 @@ export class PicturePanel {
   private jobs: Job[] = [];
   private films: Film[] = [];
   private histories: { rays: number; error: number; samples: number }[][] = [[], []];
+  private errors = new ErrorPlot();
   private preview = false;
   private settle = 0;
   /** Counts the started renders. */
@@ -37,6 +46,7 @@ export class PicturePanel {
   /** The last automatic exposure, the view that it belongs to, and the light and scene for which it is a good guess. */
   private automatic = { exposure: 0, view: "", light: "" };
   private reference: Reference;
+  private referTimer = 0;
   private lastPlot = 0;
   /** The settings that determine the rendered picture. */
   private renderedKey = "";
@@ -46,10 +56,15 @@ export class PicturePanel {
   constructor(private app: App) {
     this.view = new FilmView($<HTMLCanvasElement>("film"), !new URLSearchParams(location.search).has("2d"));
     app.engines.events = {
-      update: (job, update) => this.update(job, update.windows, update.pixels),
-      failed: (_, error) => app.tell(error, true),
+      update: (job, host, update) => this.update(job, host, update),
+      ended: (job) => {
+        if (!this.jobs.includes(job)) return;
+        this.pace();
+        if (this.jobs.includes(job)) this.finish(job);
+      },
+      failed: (job, error) => this.failed(job, error),
     };
-    this.reference = new Reference(app, (windows) => this.referenceChanged(windows));
+    this.reference = new Reference(app, () => this.referenceChanged(), () => this.isReferred());
     app.on((what) => this.changed(what));
     this.wireControls();
     this.wireCamera();
@@ -73,10 +88,20 @@ export class PicturePanel {
     // A changed hash may concern only another panel.
     if (what === "all" && key === this.renderedKey) return;
     this.renderedKey = key;
-    void this.restart(what !== "render");
+    // Another page that shows a step needs no picture.
+    if (!this.app.embeds) void this.restart(what !== "render");
   }
 
   // ---- rendering
+
+  /** A link with a bad strategy shows the usual one. */
+  private failed(job: Job, error: string) {
+    this.app.tell(error, true);
+    const side = this.jobs.indexOf(job);
+    if (side < 0 || this.preview || this.times.done) return;
+    const key = side ? "beside" : "strategy";
+    if (this.app.state[key] !== DEFAULT[key]) this.app.replace(key, error);
+  }
 
   /** Restarts the render. After a change of the view, first renders a small preview for an immediate response. */
   async restart(atOnce: boolean) {
@@ -117,12 +142,13 @@ export class PicturePanel {
     // The old picture stays until there are new pixels.
     this.films = this.jobs.map(() => new Film(size, size));
     this.histories = [[], []];
-    this.refer();
+    this.chooseReference();
     if (!preview) this.app.progress("Rendering …");
     $("viewer").toggleAttribute("data-busy", true);
   }
 
-  private update(job: Job, windows: Uint32Array, pixels: Float32Array) {
+  private update(job: Job, host: Host, update: Update) {
+    const { windows, pixels } = update;
     const side = this.jobs.indexOf(job);
     if (side < 0) return;
     const film = this.films[side];
@@ -136,6 +162,7 @@ export class PicturePanel {
       if (side === 0 && this.jobs.length === 1) this.view.show(1, null);
       this.times.first ||= performance.now();
     } else this.view.update(side, windows, pixels);
+    if (!this.preview) job.passes.note(host, update, film);
     this.pace();
     if (this.preview) {
       document.documentElement.dataset.preview = String(Math.round(performance.now() - this.times.start));
@@ -145,54 +172,83 @@ export class PicturePanel {
     const history = this.histories[side];
     const last = history.at(-1)?.rays ?? 0;
     if (measured && measured.samples >= 2 && measured.rays > (job.complete ? last : 1.15 * last)) history.push(measured);
-    this.report(job.complete);
-    if (this.jobs.every((j) => j.complete)) {
-      this.times.done = performance.now();
-      this.app.progress(`Done in ${((this.times.done - this.times.start) / 1000).toFixed(1)} s${this.app.engines.shortage}`);
-      $("viewer").toggleAttribute("data-busy", false);
-      document.documentElement.dataset.complete = String(job.token);
-    }
+    this.finish(job);
     document.documentElement.dataset.ready = "true";
+  }
+
+  /** Reports what is done, and what follows when all is. */
+  private finish(job: Job) {
+    this.report(job.complete);
+    if (!this.jobs.every((j) => j.complete)) return;
+    this.times.done = performance.now();
+    this.app.progress(`Done in ${((this.times.done - this.times.start) / 1000).toFixed(1)} s${this.app.engines.shortage}`);
+    $("viewer").toggleAttribute("data-busy", false);
+    document.documentElement.dataset.complete = String(job.token);
+    this.refer();
   }
 
   // ---- the error
 
-  /** Starts a reference of the picture if the view shows its error. */
-  private refer() {
-    this.reference.stop();
-    this.view.show(2, null);
+  /** Chooses the reference of the picture, which is made when the picture is done or takes long. */
+  private chooseReference() {
+    clearTimeout(this.referTimer);
+    if (this.preview) {
+      this.reference.stop();
+      return;
+    }
+    this.reference.choose(this.jobs[0].settings);
+    this.showReference();
     this.tellError();
-    if (this.app.state.view === "error" && !this.preview && this.jobs.length) void this.reference.start(this.jobs[0].settings);
+    const isTimed = this.jobs.length > 1 && this.app.state.equal === "time";
+    if (this.app.state.view === "error") this.refer();
+    // A reference beside pictures of equal time would take time from them.
+    else if (!isTimed) this.referTimer = setTimeout(() => this.refer(), PATIENCE) as unknown as number;
   }
 
-  private referenceChanged(windows: Uint32Array | "all") {
-    const { reference } = this;
-    if (windows === "all" || !this.view.films[2]) {
-      if (reference.isReady) this.view.show(2, reference.film);
-    } else this.view.repaint(2, windows);
-    this.report(false);
+  private refer() {
+    if (!this.preview && this.jobs.length) this.reference.run();
+  }
+
+  private referenceChanged() {
+    this.showReference();
+    this.report(true);
+  }
+
+  /** Gives the view the reference if it shows errors. */
+  private showReference() {
+    const film = this.view.look.errors ? this.reference.film : null;
+    if (film || this.view.films[2]) this.view.show(2, film);
+  }
+
+  /** Whether the reference suffices for what is shown. */
+  private isReferred(): boolean {
+    const isShown = this.app.state.view === "error";
+    // How much is enough is known when the pictures are done.
+    if (!this.jobs.every((job) => job.complete)) return this.reference.renders >= RENDERS_BEFORE;
+    if (!this.reference.isReady) return false;
+    return this.measured().every((passes) => this.reference.settles(passes.at(-1)?.error ?? 0, isShown));
+  }
+
+  /** The errors of the pictures at their passes, and where they were stopped. */
+  private measured(): Measured[][] {
+    return this.jobs.map((job, i) => this.errors.measure(job, this.films[i], this.reference));
   }
 
   /** Shows the error under the picture. */
-  private tellError(): number[] {
+  private tellError() {
     const { reference } = this, legend = $("error-legend");
     legend.hidden = this.app.state.view !== "error";
-    if (legend.hidden) return [];
-    if (!reference.isReady) {
-      legend.textContent = "Rendering a reference …";
-      return [];
-    }
-    const errors = this.films.map((film) => reference.error(film));
-    const named = errors.map((error, i) => (errors.length > 1 ? `${this.jobs[i].strategy} ` : "") + short(error)).join(", ");
-    legend.textContent = `Blue pixels are too dark, orange pixels too bright. Full color means an error of 100 %, black 0.4 % or less. Relative squared error: ${named}, against a reference with ${Math.round(reference.statistics!.samples)} samples per pixel, whose own variance of ${short(reference.variance)} is subtracted.`;
-    if (this.jobs.every((job) => job.complete)) reference.settle(Math.min(...errors));
-    return errors;
+    if (legend.hidden) return;
+    if (reference.failure) legend.textContent = `There is no reference: ${reference.failure}.`;
+    else if (!reference.film) legend.textContent = "Rendering a reference …";
+    else legend.textContent = `Blue pixels are too dark, orange pixels too bright. Full color means an error of 100 %, black 0.4 % or less. The reference has ${reference.samples} samples per pixel.`;
   }
 
   private calibrated = false;
 
-  /** At equal rays, sets the right picture's sample count for the same number of rays, and pauses the picture that is
-   *  ahead. At equal time, stops the right picture when the left one ends. */
+  /** At equal rays, gives the right picture slightly more samples than it should need, pauses the picture that is ahead,
+   *  and stops the right one when it has the left one's rays. At equal time, stops the right picture when the left one
+   *  ends. */
   private pace() {
     if (this.jobs.length < 2) return;
     const { engines, state } = this.app, [a, b] = this.jobs;
@@ -201,21 +257,33 @@ export class PicturePanel {
       return;
     }
     const both = this.jobs.map((job) => job.statistics), rays = both.map((s) => s.shadowRays);
-    if (!this.calibrated && both.every((s) => s.samples >= 1)) {
+    // Short passes may ask for other numbers of rays than long ones.
+    const known = (job: Job, i: number) => job.complete || both[i].samples >= Math.max(1, a.settings.spp / 4);
+    if (!this.calibrated && this.jobs.every(known)) {
       this.calibrated = true;
       // Compare rays per hit: hits per sample are the same for both, and tiles may be in different passes.
       const [ofLeft, ofRight] = both.map((s) => s.shadowRays / Math.max(s.shadingPoints, 1));
-      const spp = Math.min(Math.max(1, Math.round(state.spp * ofLeft / Math.max(ofRight, 1e-3))), 65536);
-      if (spp !== b.settings.spp) {
-        this.jobs[1] = engines.again(b, { spp });
-        this.histories[1] = [];
-        engines.pause(a, false);
-        return;
-      }
+      this.replaceRight(a.settings.spp * ofLeft / Math.max(ofRight, 1e-3));
+      return;
     }
-    const ahead = 1.02 * Math.max(1, Math.min(...rays)) + 20_000;
-    engines.pause(a, !b.complete && rays[0] > ahead);
-    engines.pause(b, !a.complete && rays[1] > ahead);
+    if (!this.calibrated) return;
+    if (a.complete && b.complete) {
+      // The estimate was too low: now the number of rays per sample is known.
+      if (b.isWhole && rays[1] < 0.98 * rays[0]) this.replaceRight(b.settings.spp * rays[0] / Math.max(rays[1], 1));
+      return;
+    }
+    if (a.complete) return engines.endAt(b, rays[0]);
+    engines.pause(a, rays[0] > 1.02 * Math.max(1, rays[1]) + 20_000);
+    engines.pause(b, rays[1] > rays[0]);
+  }
+
+  /** Starts the right picture anew for a number of samples, and some to spare. */
+  private replaceRight(spp: number) {
+    const { engines } = this.app, b = this.jobs[1], spare = Math.min(Math.max(1, Math.ceil(SPARE * spp)), 65536);
+    if (spare === b.settings.spp) return;
+    this.jobs[1] = engines.again(b, { spp: spare });
+    this.histories[1] = [];
+    engines.pause(this.jobs[0], false);
   }
 
   /** Computes the program's automatic exposure for the state, unless it is known. */
@@ -259,20 +327,9 @@ export class PicturePanel {
       return `${s.samples.toFixed(s.samples < 10 ? 1 : 0)} samples per pixel, ${count(s.shadowRays)} shadow rays${bad}`;
     };
     $("counts").textContent = this.jobs.map((job) => (this.jobs.length > 1 ? `${job.strategy}: ` : "") + one(job)).join(" · ");
-    const errors = this.tellError();
-    const series: Series[] = this.jobs.map((job, i) => ({
-      name: job.strategy || job.settings.strategy, kind: i ? "second" : "first",
-      points: this.histories[i].map((p): [number, number] => [p.rays, Math.sqrt(p.error)]),
-    }));
-    const measured = errors.flatMap((error, i): Series[] => (error > 0 ? [{
-      name: "", kind: i ? "second" : "first", as: "dots", points: [[this.jobs[i].statistics.shadowRays, Math.sqrt(error)]],
-    }] : []));
-    if ([...series, ...measured].every((s) => !s.points.length)) $("error-plot").replaceChildren();
-    else $("error-plot").innerHTML = plot([...series, ...guideLine(series), ...measured], { x: { name: "shadow rays", log: true, tick: count }, y: { name: "relative RMSE", log: true }, height: 200 });
-    const slopes = series.map((s) => `${s.name}: ${short(s.points.at(-1)?.[1] ?? NaN)}, slope ${signed(slope(s.points))}`);
-    $("error-plot").setAttribute("aria-label", `Relative RMSE estimated from the variance. ${slopes.join("; ")}`);
-    $("error-plot").parentElement!.querySelector("figcaption")!.textContent =
-      `Relative RMSE over shadow rays, estimated from the variance of the samples, which shows neither bias nor rare bright samples — ${series.map((s) => { const k = slope(s.points); return !isFinite(k) ? `${s.name}: a slope needs two passes` : k < 0 ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: too few samples for a slope`; }).join("; ")}${measured.length ? ". Dots: measured against the reference" : ". “Show its error” measures it"}`;
+    this.tellError();
+    const estimates = this.histories.map((history) => history.map(({ rays, error }) => ({ rays, error, isWhole: true })));
+    this.errors.show(this.jobs, this.measured(), estimates, this.reference);
     $("command").replaceChildren(...words(commandWords(this.app.state)));
   }
 
@@ -282,7 +339,9 @@ export class PicturePanel {
     const { state } = this.app;
     this.view.look.curve = state.curve as Curve;
     this.view.look.errors = state.view === "error";
-    if (this.view.look.errors !== !!this.reference.isStarted) this.refer();
+    this.showReference();
+    this.tellError();
+    if (this.view.look.errors) this.refer();
     if (state.exposure !== null) this.showExposure(state.exposure);
     else this.view.set({});
     const split = !!state.beside;
@@ -517,23 +576,15 @@ export class PicturePanel {
     });
     $("save-exr").addEventListener("click", () => this.save("exr"));
     $("save-png").addEventListener("click", () => this.save("png"));
-    $("copy-link").addEventListener("click", () => this.copy(`${location.href.replace(/#.*/, "")}#${toHash(app.state)}`, "Link copied"));
-    $("copy-command").addEventListener("click", () => this.copy(command(app.state), "Command copied"));
+    $("copy-link").addEventListener("click", () => app.copy(addressOf(app.state), `Link copied${this.notInLinks}`));
+    $("copy-command").addEventListener("click", () => app.copy(command(app.state), "Command copied"));
   }
 
-  private async copy(text: string, told: string) {
-    try {
-      await navigator.clipboard.writeText(text);
-    } catch {
-      // Without clipboard permission, use the legacy command.
-      const area = document.createElement("textarea");
-      area.value = text;
-      document.body.append(area);
-      area.select();
-      document.execCommand("copy");
-      area.remove();
-    }
-    this.app.tell(told);
+  /** What a link does not carry. */
+  private get notInLinks(): string {
+    const { scene, env } = this.app.state;
+    const files = [...(SCENES.includes(scene) ? [] : [scene]), ...(isBuiltinProbe(env) ? [] : [env])].map(fileName);
+    return files.length ? `; it names ${files.join(" and ")}, to be dropped there` : "";
   }
 
   /** The picture as the bytes of a file. */
@@ -560,11 +611,3 @@ export class PicturePanel {
 /** Redraws canvases when the theme changes. */
 export const themed = (draw: () => void) => matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 export { color };
-
-/** The slope of independent samples, −½, from the first point of the first line that has two. */
-function guideLine(series: Series[]): Series[] {
-  const points = series.map((s) => s.points.filter(([x, y]) => x > 0 && y > 0)).find((all) => all.length > 1);
-  if (!points) return [];
-  const [[x, y], [end]] = [points[0], points.at(-1)!];
-  return [{ name: "slope −½", kind: "shade", points: [[x, y], [end, y * Math.sqrt(x / end)]] }];
-}

@@ -5,8 +5,9 @@ import { h } from "./dom";
 /** The duration of a step in playback [ms]. */
 const STEP = 160;
 
-/** Buttons that move `input` step by step; playing from the last step starts over. */
-export function player(input: HTMLInputElement): HTMLElement {
+/** Buttons that move `input` by `by` at each step, once `isDrawn` says that the last step is seen; playing from the last
+ *  step starts over. */
+export function player(input: HTMLInputElement, by: number, isDrawn: () => boolean): HTMLElement {
   let timer = 0;
   const button = (name: string, act: () => void) => {
     const element = h("button", { type: "button" }, name);
@@ -26,15 +27,15 @@ export function player(input: HTMLInputElement): HTMLElement {
   const tick = () => {
     // A figure that is not shown stands still.
     if (!input.isConnected || input.offsetParent === null || isLast()) return play(false);
-    set(Number(input.value) + Number(input.step));
+    if (isDrawn()) set(Number(input.value) + by);
   };
-  const step = (by: number) => {
+  const step = (direction: number) => {
     play(false);
-    set(Number(input.value) + by * Number(input.step));
+    set(Number(input.value) + direction * by);
   };
   const toggle = button("Play", () => {
     if (!timer && isLast()) set(Number(input.min));
     play(!timer);
   });
-  return h("div", { class: "row player", role: "group", "aria-label": "Playback" }, button("Step back", () => step(-1)), toggle, button("Step forward", () => step(1)));
+  return h("div", { class: "row player", role: "group", "aria-label": `Playback of ${input.dataset.name}` }, button("Step back", () => step(-1)), toggle, button("Step forward", () => step(1)));
 }

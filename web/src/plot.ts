@@ -1,14 +1,18 @@
 // Plots as SVG.
 
 import { short, superscript } from "./dom";
+import type { Frame } from "./pointer";
+
+/** The color: of one of several pictures or curves, or of a concept, which has the same color in all figures. */
+export type Kind = "first" | "second" | "third" | "shade" | "light" | "lobe" | "visibility" | "product" | "estimate";
 
 export interface Series {
   name: string;
   points: [number, number][];
-  kind: "first" | "second" | "third" | "shade";
-  /** Draws bars, dots or an area instead of a line; a band covers the range between two values of x; a ribbon is bounded by
+  kind: Kind;
+  /** Draws bars, dots, dots on a line, a dashed line or an area instead of a line; a band covers the range between two values of x; a ribbon is bounded by
    *  its points, which run along its upper edge and back along its lower edge. */
-  as?: "line" | "dots" | "bars" | "area" | "band" | "ribbon";
+  as?: "line" | "dots" | "bars" | "area" | "band" | "ribbon" | "marked" | "dashed";
 }
 
 export interface Axes {
@@ -17,6 +21,9 @@ export interface Axes {
   height?: number;
   width?: number;
 }
+
+/** The attribute by which the pointer is read, see `onPointer`. */
+export const framed = (frame: Frame) => ` data-frame='${JSON.stringify(frame)}'`;
 
 const escape = (text: string) => text.replace(/[&<>]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[c]!);
 
@@ -65,11 +72,14 @@ const widthOf = (() => {
 function swatch({ kind, as }: Series, x: number, y: number): string {
   if (as === "dots") return `<circle class="${kind} fill" cx="${x - 7}" cy="${y}" r="3"/>`;
   if (as === "bars" || as === "area" || as === "band" || as === "ribbon") return `<rect class="${kind} fill faint" x="${x - 14}" y="${y - 5}" width="14" height="10"/>`;
-  return `<path class="${kind} line" d="M${x - 14} ${y}h14"/>`;
+  return `<path class="${kind} line${as === "dashed" ? " dashed" : ""}" d="M${x - 14} ${y}h14"/>`;
 }
 
+/** Whether the lecture is shown to a room: figures are then large and low, to fit a screen. */
+export const isPresenting = () => document.documentElement.hasAttribute("data-presenting");
+
 /** The width of a figure; text keeps its size on a phone. */
-export const figureWidth = () => Math.min(640, Math.max(320, document.documentElement.clientWidth - 32));
+export const figureWidth = () => isPresenting() ? 640 : Math.min(640, Math.max(320, document.documentElement.clientWidth - 32));
 
 /** Calls `redraw` when the window's size has changed the width of figures. */
 export function onFigureWidth(redraw: () => void) {
@@ -86,7 +96,7 @@ export function onFigureWidth(redraw: () => void) {
 
 /** An SVG plot of series. */
 export function plot(series: Series[], axes: Axes): string {
-  const width = axes.width ?? figureWidth(), height = axes.height ?? 240;
+  const width = axes.width ?? figureWidth(), height = (axes.height ?? 240) * (isPresenting() ? 0.75 : 1);
   const named = series.filter((s) => s.name);
   const ofLegend = named.reduce((sum, s) => sum + widthOf(s.name) + 36, 0);
   const [left, right, bottom] = [58, 14, 38];
@@ -124,7 +134,9 @@ export function plot(series: Series[], axes: Axes): string {
       out.push(`<rect class="${s.kind} fill faint" x="${from}" y="${top}" width="${to - from}" height="${height - bottom - top}"/>`);
     } else if (s.as === "area") out.push(`<path class="${s.kind} fill faint" d="M${X(points[0][0])},${base}L${points.map(at).join("L")}L${X(points[points.length - 1][0])},${base}Z"/>`);
     else if (s.as === "ribbon") out.push(`<path class="${s.kind} fill faint" d="M${points.map(at).join("L")}Z"/>`);
-    else out.push(`<path class="${s.kind} line" d="M${points.map(at).join("L")}"/>`);
+    else out.push(`<path class="${s.kind} line${s.as === "dashed" ? " dashed" : ""}" d="M${points.map(at).join("L")}"/>`);
+    // A line of one point would be invisible.
+    if (s.as === "marked" || ((!s.as || s.as === "line" || s.as === "dashed") && points.length === 1)) out.push(...points.map((p) => `<circle class="${s.kind} fill" cx="${X(p[0]).toFixed(1)}" cy="${Y(p[1]).toFixed(1)}" r="3"/>`));
   }
   out.push(`<path class="axis" d="M${left} ${height - bottom}H${width - right}"/>`);
   out.push(`<text x="${(left + width - right) / 2}" y="${height - 4}" text-anchor="middle">${escape(axes.x.name)}</text>`);
@@ -136,7 +148,7 @@ export function plot(series: Series[], axes: Axes): string {
     out.push(swatch(s, legend, legendAt - 4));
     legend -= 30;
   }
-  const frame = axes.x.log || axes.y.log ? "" : ` data-frame='${JSON.stringify({ left, right: width - right, top, bottom: height - bottom, xs, ys })}'`;
+  const frame = framed({ left, right: width - right, top, bottom: height - bottom, xs, ys, logs: [!!axes.x.log, !!axes.y.log] });
   return `<svg viewBox="0 0 ${width} ${height}"${frame} aria-hidden="true">${out.join("")}</svg>`;
 }
 

@@ -13,6 +13,8 @@ export interface MapPicture {
   width: number;
   height: number;
   pixels: Float32Array;
+  /** The integral of each layer over the sphere, where the layers have integrals. */
+  integrals: Float64Array;
 }
 
 type Plain<R> = R extends MapView ? MapPicture : R;
@@ -37,6 +39,8 @@ export type ToWorker =
   | { kind: "call"; id: number; call: Call; args: unknown[] }
   | { kind: "render"; token: number; settings: string }
   | { kind: "pause"; token: number; paused: boolean }
+  /** Pauses a render as near as its tiles allow to a number of shadow rays, and says so. */
+  | { kind: "budget"; token: number; rays: number }
   | { kind: "stop" };
 
 export interface Update {
@@ -46,6 +50,10 @@ export interface Update {
   pixels: Float32Array;
   complete: boolean;
   progress: number;
+  /** The samples of each pixel at the end of a pass; 0 within one. */
+  whole: number;
+  /** The time in the engine since the last update [ms]. */
+  milliseconds: number;
   statistics: Statistics;
 }
 
@@ -56,5 +64,6 @@ export type FromWorker =
   | { kind: "result"; id: number; result: unknown; memory: number }
   | { kind: "error"; id: number; error: string; dead: boolean }
   | { kind: "started"; token: number; strategy: string }
+  | { kind: "spent"; token: number }
   | { kind: "failed"; token: number; error: string; dead: boolean }
   | Update;

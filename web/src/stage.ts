@@ -5,55 +5,67 @@ import { h, latest, short } from "./dom";
 import { player } from "./player";
 import { onPointer, type Pointed } from "./pointer";
 
+/** A slider's value, and how a figure sets it. */
+export interface Slider {
+  (): number;
+  set(x: number): void;
+  readonly input: HTMLInputElement;
+}
+
 /** Controls and a drawing area, filled by a figure. */
 export class Stage {
   private inputs: (HTMLInputElement | HTMLSelectElement)[] = [];
   readonly drawing = h("div");
   readonly result = h("p", { class: "result", role: "status" });
+  /** The values under the pointer. */
+  private readout = h("p", { class: "readout" }, "\u00a0");
   private controls = h("div", { class: "controls" });
 
   /** `values` are the controls' values in order; missing or invalid values get the figure's defaults. */
-  constructor(readonly place: HTMLElement, readonly app: App, private values: string[]) {
-    place.replaceChildren(this.drawing, this.controls, this.result);
+  constructor(readonly place: HTMLElement, readonly app: App, private values: string[], private answers: (text: string) => void = () => {}) {
+    place.replaceChildren(this.drawing, this.readout, this.controls, this.result);
   }
 
   /** Adds a slider; `shown` formats its value. */
-  slider(name: string, min: number, max: number, step: number, value: number, shown: (x: number) => string = short): () => number {
-    const input = this.range(name, min, max, step, value, shown);
-    return () => Number(input.value);
+  slider(name: string, min: number, max: number, step: number, value: number, shown: (x: number) => string = short): Slider {
+    const input = h("input", { type: "range", min: String(min), max: String(max), step: String(step), "data-name": name });
+    input.value = this.begin(input, String(value));
+    const output = h("output");
+    const tell = () => { output.textContent = shown(Number(input.value)); };
+    tell();
+    input.addEventListener("input", () => { tell(); this.changed(); });
+    this.controls.append(h("label", {}, name, input, output));
+    const set = (x: number) => {
+      const before = input.value;
+      input.value = String(x);
+      if (input.value !== before) input.dispatchEvent(new Event("input", { bubbles: true }));
+    };
+    return Object.assign(() => Number(input.value), { set, input });
   }
 
   /** Adds a slider that plays from `min` to `max` in steps of one. */
-  player(name: string, min: number, max: number, value: number, shown: (x: number) => string = short): () => number {
-    const input = this.range(name, min, max, 1, value, shown);
-    this.controls.append(player(input));
-    return () => Number(input.value);
+  player(name: string, min: number, max: number, value: number, shown: (x: number) => string = short): Slider {
+    const slider = this.slider(name, min, max, 1, value, shown);
+    this.play(slider, 1);
+    return slider;
   }
 
-  /** Adds a slider that dragging in the first plot moves as well: to `value` of the place, which is null to leave it. The
-   *  result is the place under the pointer. */
-  dragged(name: string, min: number, max: number, step: number, value: number, shown: (x: number) => string, valueAt: (at: Pointed) => number | null): [() => number, () => Pointed | null] {
-    const input = this.range(name, min, max, step, value, shown);
+  /** Adds playback that moves a slider by `by` at each step. */
+  play({ input }: Slider, by: number) {
+    this.controls.append(player(input, by, () => !this.isDrawing));
+  }
+
+  /** Reads the pointer over the figure's plots and maps; `drag` is called while it drags. */
+  pointer(drag: (at: Pointed) => void): () => Pointed | null {
     let pointed: Pointed | null = null;
     this.drawing.classList.add("touchable");
     onPointer(this.drawing, (at) => {
       if (!at && !pointed) return;
       pointed = at;
-      const moved = at?.dragged ? valueAt(at) : null;
-      if (moved === null) return this.redraw();
-      input.value = String(moved);
-      input.dispatchEvent(new Event("input", { bubbles: true }));
+      if (at?.dragged) drag(at);
+      this.redraw();
     });
-    return [() => Number(input.value), () => pointed];
-  }
-
-  private range(name: string, min: number, max: number, step: number, value: number, shown: (x: number) => string): HTMLInputElement {
-    const input = h("input", { type: "range", min: String(min), max: String(max), step: String(step) });
-    input.value = this.begin(input, String(value));
-    const output = h("output", {}, shown(Number(input.value)));
-    input.addEventListener("input", () => { output.textContent = shown(Number(input.value)); this.changed(); });
-    this.controls.append(h("label", {}, name, input, output));
-    return input;
+    return () => pointed;
   }
 
   choice(name: string, values: [string, string][]): () => string {
@@ -78,13 +90,20 @@ export class Stage {
     this.redraw();
   }
 
+  private drawn: () => void = () => {};
+  /** Resolves when the figure is drawn for the first time. */
+  readonly firstDrawn = new Promise<void>((done) => { this.drawn = done; });
   private drawNow: () => void | Promise<void> = () => {};
+  private isDrawing = false;
   readonly redraw = latest(async () => {
+    this.isDrawing = true;
     try {
       await this.drawNow();
     } catch (error) {
       this.app.tell((error as Error).message, true);
     }
+    this.isDrawing = false;
+    this.drawn();
     this.place.dataset.drawn = String(Number(this.place.dataset.drawn ?? 0) + 1);
   });
 
@@ -94,11 +113,21 @@ export class Stage {
     this.redraw();
   }
 
-  /** Shows an SVG with a text alternative. */
-  svg(markup: string, label: string) {
+  /** Shows an SVG with a text alternative, below other pictures. */
+  svg(markup: string, label: string, ...above: HTMLElement[]) {
     const image = h("div", { role: "img", "aria-label": label });
     image.innerHTML = markup;
-    this.drawing.replaceChildren(image);
+    this.drawing.replaceChildren(...above, image);
+  }
+
+  /** Shows the values under the pointer, if any. */
+  read(text: string | null) {
+    this.readout.textContent = text?.replaceAll(" %", "\u00a0%") || "\u00a0";
+  }
+
+  /** Answers the step's question from what the figure shows. */
+  answer(text: string) {
+    this.answers(text);
   }
 
   say(text: string) {

@@ -2,6 +2,7 @@
 
 import { $ } from "./dom";
 import type { Camera } from "./engines";
+import { STEPS } from "./steps";
 import { CURVES } from "./tone";
 
 export interface State {
@@ -68,9 +69,11 @@ export const MAPPINGS: [string, string][] = [
 
 const optionsOf = (id: string) => [...$<HTMLSelectElement>(id).options].map(({ value }) => value);
 
+export const PANELS = ["picture", "map", "xray", "lights", "lecture"];
+
 /** The texts that the state may have where only a few are possible. */
 const CHOICES: Partial<Record<keyof State, readonly string[]>> = {
-  curve: CURVES, mapping: MAPPINGS.map(([name]) => name),
+  panel: PANELS, curve: CURVES, mapping: MAPPINGS.map(([name]) => name),
   equal: optionsOf("equal"), view: optionsOf("view"), layer: optionsOf("layer"), method: optionsOf("method"),
 };
 
@@ -85,23 +88,18 @@ export function toHash(state: State): string {
   return parts.toString();
 }
 
-/** Parses the state from a hash; invalid parts keep their defaults. */
-export function fromHash(hash: string): State {
-  const state: Record<string, unknown> = { ...DEFAULT };
+/** Parses the state from a hash. Invalid parts keep their defaults and are returned as `wrong`. */
+export function fromHash(hash: string): { state: State; wrong: string[] } {
+  const state: Record<string, unknown> = { ...DEFAULT }, wrong: string[] = [];
   for (const [key, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
-    if (!(key in DEFAULT)) continue;
-    const fallback = DEFAULT[key as keyof State];
-    if (typeof fallback === "string") {
-      if (CHOICES[key as keyof State]?.includes(text) ?? true) state[key] = text;
-      continue;
-    }
-    try {
-      const value = JSON.parse(text);
-      if (isOfKind(key, value, fallback)) state[key] = value;
-    } catch { /* Not JSON: the default. */ }
+    const value = Object.hasOwn(DEFAULT, key) ? parsed(key as keyof State, text) : undefined;
+    if (value === undefined) wrong.push(`${key}=${text}`);
+    else state[key] = value;
   }
-  const clamp = (key: "size" | "spp" | "seed" | "rows" | "lights" | "samples" | "lamps" | "gloss", most: number, least = 1) => {
-    state[key] = Math.min(Math.max(least, Math.round(state[key] as number)), most);
+  const clamp = (key: "size" | "spp" | "seed" | "rows" | "lights" | "samples" | "lamps" | "gloss" | "step", most: number, least = 1) => {
+    const given = state[key] as number;
+    state[key] = Math.min(Math.max(least, Math.round(given)), most);
+    if (state[key] !== given) wrong.push(`${key}=${given}`);
   };
   clamp("size", 2048);
   clamp("spp", 1 << 16);
@@ -111,8 +109,24 @@ export function fromHash(hash: string): State {
   clamp("samples", 8, 0);
   clamp("lamps", 4096, 0);
   clamp("gloss", 100, 0);
-  if (!((state.scale as number) >= 0)) state.scale = 1;
-  return state as unknown as State;
+  clamp("step", STEPS.length);
+  if (!((state.scale as number) >= 0)) {
+    wrong.push(`scale=${state.scale}`);
+    state.scale = 1;
+  }
+  return { state: state as unknown as State, wrong };
+}
+
+/** A part of the state from its text; undefined if it is none. */
+function parsed(key: keyof State, text: string): unknown {
+  const fallback = DEFAULT[key];
+  if (typeof fallback === "string") return CHOICES[key]?.includes(text) ?? true ? text : undefined;
+  try {
+    const value = JSON.parse(text);
+    return isOfKind(key, value, fallback) ? value : undefined;
+  } catch {
+    return undefined;
+  }
 }
 
 function isOfKind(key: string, value: unknown, fallback: unknown): boolean {
@@ -166,6 +180,12 @@ export const command = (state: State) => commandWords(state).join(" ");
 export const PROBES = ["sky", "studio", "cathedral", "constant"];
 export const SCENES = ["statue", "spheres", "material-ball", "room", "sphere", "sphere-orthographic"];
 export const isBuiltinProbe = (name: string) => PROBES.includes(name);
+
+/** The address of this page for other people: the one that was built in, or where the page is. */
+export function addressOf(state: State, query = ""): string {
+  const base = document.querySelector<HTMLMetaElement>("meta[name=base]")!.content || location.href.replace(/[?#].*/, "");
+  return `${base}${query}#${toHash(state)}`;
+}
 
 /** The last part of a path. */
 export const fileName = (path: string) => path.split("/").pop()!;

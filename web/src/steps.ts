@@ -1,5 +1,7 @@
 // The text of the lecture: sampling direct illumination under a light probe.
 
+import type { Kind } from "./plot";
+
 export interface Step {
   title: string;
   text: string[];
@@ -13,8 +15,8 @@ const i = (x: string) => `<mi>${x}</mi>`;
 const n = (x: number | string) => `<mn>${x}</mn>`;
 const o = (x: string) => `<mo>${x}</mo>`;
 const row = (...x: string[]) => `<mrow>${x.join("")}</mrow>`;
-/** A term in the color of its curve in the figure. */
-const ofKind = (kind: "first" | "second", ...x: string[]) => `<mrow class="${kind}">${x.join("")}</mrow>`;
+/** A term in the color of its curve in the figures. */
+const ofKind = (kind: Kind, ...x: string[]) => `<mrow class="${kind}">${x.join("")}</mrow>`;
 const frac = (a: string, b: string) => `<mfrac>${row(a)}${row(b)}</mfrac>`;
 const sub = (a: string, b: string) => `<msub>${row(a)}${row(b)}</msub>`;
 const sup = (a: string, b: string) => `<msup>${row(a)}${row(b)}</msup>`;
@@ -29,7 +31,8 @@ const par = (...x: string[]) => row('<mo stretchy="false">(</mo>', ...x, '<mo st
 const sqrt = (...x: string[]) => `<msqrt>${x.join("")}</msqrt>`;
 const eq = o("="), d = `<mspace width="0.17em"/><mi mathvariant="normal">d</mi>`;
 const wi = sub(i("ω"), i("i")), wo = sub(i("ω"), i("o")), wh = sub(i("ω"), i("h"));
-const fr = sub(i("f"), i("r")), cos = (x: string) => row(i("cos"), of, sub(i("θ"), x));
+const fr = ofKind("lobe", sub(i("f"), i("r"))), cos = (x: string) => ofKind("lobe", i("cos"), of, sub(i("θ"), x));
+const Li = ofKind("light", sub(i("L"), i("i"))), V = ofKind("visibility", i("V")), qLight = ofKind("light", sub(i("q"), i("m"))), qLobe = ofKind("lobe", sub(i("q"), i("n")));
 const phat = `<mover>${i("p")}${o("^")}</mover>`;
 const overN = frac(n(1), i("N")), sumN = sum(row(i("j"), eq, n(1)), i("N"));
 
@@ -40,7 +43,7 @@ export const STEPS: Step[] = [
       "A pixel’s direct illumination is an integral over all directions: reflectance times cosine, times incident light, times visibility. It has no closed form for a photographed sky.",
       "But it has a Monte Carlo estimate. Sample directions from any density that is positive wherever the integrand is, divide each value by the density of its direction, and average. The estimate is unbiased for every N; only its standard deviation depends on the density, and it falls with the square root of N.",
     ],
-    formulas: [row(i("I"), eq, o("∫"), ofKind("first", i("f"), par(i("x"))), d, i("x"), o("≈"), overN, sumN, frac(ofKind("first", i("f"), par(sub(i("x"), i("j")))), ofKind("second", i("p"), par(sub(i("x"), i("j")))))), row(i("σ"), o("∝"), frac(n(1), sqrt(i("N"))))],
+    formulas: [row(i("I"), eq, o("∫"), ofKind("product", i("f"), par(i("x"))), d, i("x"), o("≈"), overN, sumN, frac(ofKind("product", i("f"), par(sub(i("x"), i("j")))), ofKind("light", i("p"), par(sub(i("x"), i("j")))))), row(i("σ"), o("∝"), frac(n(1), sqrt(i("N"))))],
     question: "How many more samples halve the error? Press Play, then drag p until it resembles f.",
     answer: "Four times as many: on log axes the error falls with slope −½. A density shaped like the integrand lowers the whole line, and a density exactly proportional to it has no error at all.",
   },
@@ -100,9 +103,9 @@ export const STEPS: Step[] = [
       "With both tables, directions are sampled in proportion to the light. Then light over density is constant, equal to the map’s total, and only reflectance times cosine times visibility varies.",
       "So environment sampling works well for matte surfaces under a small sun, and poorly for mirrors, whose reflected direction is almost never sampled.",
     ],
-    formulas: [row(sub(i("L"), row(i("r"), o(","), i("N"))), eq, frac(row(o("∫"), sub(i("L"), i("i")), d, i("ω")), i("N")), sumN, fr, par(sub(i("ω"), i("j"))), cos(i("j")), i("V"), par(sub(i("ω"), i("j"))))],
+    formulas: [row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(row(o("∫"), Li, d, i("ω")), i("N")), sumN, fr, par(sub(i("ω"), i("j"))), cos(i("j")), V, par(sub(i("ω"), i("j"))))],
     question: "How many of the samples hit the brightest hundredth of the map?",
-    answer: "About the same share as its share of the total light. Under a sky with a sun, most samples.",
+    answer: "About the same share as its share of the total light, which the figure states; under a sky with a sun, most samples.",
   },
   {
     title: "Combine two densities",
@@ -110,17 +113,17 @@ export const STEPS: Step[] = [
       "Neither density is good everywhere. Multiple importance sampling draws directions from both and weights each sample by the densities of all techniques. Where one density is nearly zero but the integrand is not, the other technique takes over.",
       "The weights of all techniques add up to one for every direction, so the estimate stays unbiased. The power heuristic sharpens the weights; the split of samples into M and N is a separate choice.",
     ],
-    formulas: [row(sub(i("w"), i("m")), eq, frac(row(i("M"), sub(i("q"), i("m"))), row(i("M"), sub(i("q"), i("m")), o("+"), i("N"), sub(i("q"), i("n"))))), row(sub(i("I"), i("MIS")), eq, frac(n(1), i("M")), sum("", i("M")), frac(row(i("f"), sub(i("w"), i("m"))), sub(i("q"), i("m"))), o("+"), frac(n(1), i("N")), sum("", i("N")), frac(row(i("f"), sub(i("w"), i("n"))), sub(i("q"), i("n"))))],
+    formulas: [row(sub(i("w"), i("m")), eq, frac(row(i("M"), qLight), row(i("M"), qLight, o("+"), i("N"), qLobe))), row(ofKind("estimate", sub(i("I"), i("MIS"))), eq, frac(n(1), i("M")), sum("", i("M")), frac(row(i("f"), sub(i("w"), i("m"))), qLight), o("+"), frac(n(1), i("N")), sum("", i("N")), frac(row(i("f"), sub(i("w"), i("n"))), qLobe))],
     question: "Is there a lobe for which one technique alone beats the combination?",
     answer: "Yes, at the extremes: for a very wide lobe the light’s density alone, for a very narrow lobe the lobe’s density alone. The combination then has more error, but it works at both extremes, where the other technique alone fails.",
   },
   {
     title: "The product is the target",
     text: [
-      "The best density available without tracing rays is proportional to reflectance times cosine times light. Its normalization is the picture without shadows, the unoccluded radiance. It is best only where nothing is occluded: where most of the product is in shadow, a density that sends more rays to the visible rest, even one of the two factors, may have less variance.",
+      "The density proportional to reflectance times cosine times light follows the whole integrand but its visibility. Its normalization is the picture without shadows, the unoccluded radiance. It is the best density where nothing is occluded, and only there: where most of the product is in shadow, a density that sends more rays to the visible rest, even one of the two factors, may have less variance.",
       "Samples of this density all have the same value except for visibility. Only the binary visibility has variance: zero without occlusion and in full shadow, largest where half of the light is occluded. Reflectance and light no longer contribute.",
     ],
-    formulas: [row(i("p"), par(wi), eq, frac(row(fr, cos(i("i")), sub(i("L"), i("i"))), sub(i("L"), i("ns")))), row(i("Var"), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), i("Var"), of, par(i("V")))],
+    formulas: [row(ofKind("product", i("p"), par(wi)), eq, frac(row(fr, cos(i("i")), Li), sub(i("L"), i("ns")))), row(i("Var"), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), i("Var"), of, par(V))],
     question: "When does the product resemble neither of its factors?",
     answer: "When light and lobe overlap only in their tails. Then both densities waste nearly all samples, and the product has a peak that neither factor has.",
   },
@@ -130,7 +133,7 @@ export const STEPS: Step[] = [
       "The product cannot be inverted, but it can be sampled by way of one factor. Sample that factor, and accept the direction with a probability proportional to the other factor; a bound on the ratio keeps the probability at most one.",
       "Accepted directions follow the product exactly. The price is the number of tries, which grows with the looseness of the envelope and differs between pixels.",
     ],
-    formulas: [row(i("P"), par(i("keep")), eq, frac(row(i("p"), par(wi)), row(i("c"), o("·"), i("q"), par(wi))), o("≤"), n(1)), row(i("E"), par(i("tries")), eq, i("c"))],
+    formulas: [row(i("P"), par(i("keep")), eq, frac(ofKind("product", i("p"), par(wi)), ofKind("light", i("c"), o("·"), i("q"), par(wi))), o("≤"), n(1)), row(i("E"), par(i("tries")), eq, i("c"))],
     question: "How do the accepted samples change when the bound is twice too high, and when it is too low?",
     answer: "Twice too high: the same distribution, half as many samples. Too low: the target is cut off where it exceeds the envelope, here beside the peak, where the lobe is strongest relative to the light; the result is biased.",
   },
@@ -140,7 +143,7 @@ export const STEPS: Step[] = [
       "Sampling importance resampling has a fixed cost. Draw M candidates from an easy density, weight each by target over density, and select N of them in proportion to the weights. Only those N are traced.",
       "Few candidates give a distribution between the easy density and the product; as M grows, it approaches the target. The estimate is unbiased for every M if it is multiplied by the mean weight.",
     ],
-    formulas: [row(sub(i("L"), i("SIR")), eq, tall(frac(n(1), i("M")), sum(row(i("m"), eq, n(1)), i("M")), sub(i("w"), i("m"))), frac(n(1), i("N")), sumN, frac(row(i("f"), par(sub(i("ω"), i("j"))), i("V")), row(phat, par(sub(i("ω"), i("j")))))), row(sub(i("w"), i("m")), eq, frac(phat, i("q")))],
+    formulas: [row(ofKind("estimate", sub(i("L"), i("SIR"))), eq, tall(frac(n(1), i("M")), sum(row(i("m"), eq, n(1)), i("M")), sub(i("w"), i("m"))), frac(n(1), i("N")), sumN, frac(row(i("f"), par(sub(i("ω"), i("j"))), V), ofKind("product", phat, par(sub(i("ω"), i("j")))))), row(sub(i("w"), i("m")), eq, frac(ofKind("product", phat), ofKind("light", i("q"))))],
     question: "From which M can you no longer distinguish the histogram from the target?",
     answer: "It depends on the distance between candidates and target: here from 32, when the difference is within the counting noise. A narrower lobe, or light that the candidates rarely find, needs more.",
   },
@@ -152,7 +155,7 @@ export const STEPS: Step[] = [
     ],
     formulas: [
       row(i("Var"), of, sub(i("L"), i("SIR")), eq, frac(sup(i("σ"), n(2)), i("M")), o("+"), tall(n(1), o("−"), frac(n(1), i("M"))), frac(row(sub(i("L"), i("r")), par(sub(i("L"), i("ns")), o("−"), sub(i("L"), i("r")))), i("N"))),
-      row(sup(i("σ"), n(2)), eq, i("Var"), of, tall(frac(row(fr, cos(i("i")), sub(i("L"), i("i")), i("V")), i("q")))),
+      row(sup(i("σ"), n(2)), eq, i("Var"), of, tall(frac(row(fr, cos(i("i")), Li, V), i("q")))),
     ],
     question: "Which method is best per ray, and which at equal time? Add some diffuse reflectance and compare again.",
     answer: "Per ray, resampling; at equal time, usually multiple importance sampling. Diffuse reflectance hurts reflectance sampling most.",
@@ -174,14 +177,14 @@ export const STEPS: Step[] = [
       "A light is placed at the centroid of each region, with the region’s sum as its color. Bright areas get many small regions, dark areas a few large ones.",
     ],
     formulas: [row(int(sub(i("R"), n(1))), i("L"), d, i("ω"), eq, int(sub(i("R"), n(2))), i("L"), d, i("ω"), eq, frac(n(1), n(2)), int(i("R")), i("L"), d, i("ω"))],
-    question: "Under a sky with a sun, how many lights end up in the sun, and does that help?",
-    answer: "As many as its energy is worth, until its regions are single texels; the figure counts them. They all shine from almost the same direction, so one light with their sum would do as well, and the rest of the sky lacks the others.",
+    question: "How many lights end up in the brightest source, such as a sun or a lamp, and does that help?",
+    answer: "As many as its energy is worth, until its regions are single texels; the figure counts them. They all shine from almost the same direction, so one light with their sum would do as well, and the rest of the map lacks the others.",
   },
   {
     title: "Variance minimization",
     text: [
       "The goal is not equal energy but a small error. The error of a light at a centroid grows with the variance of its region’s light around it. So cut where the sum of the two variances is smallest (the original of 2009 minimizes the larger one). Finally, join regions that belong together and move each light to the centroid of what is nearest to it, until nothing moves; this bends the borders.",
-      "Then the sun stays in one region, and the lights go where the energy is spread out: to the sky around it and to the ground.",
+      "Then a small sun or lamp stays in one region, and the lights go where the energy is spread out: to the rest of the map.",
     ],
     formulas: [row(`<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
     question: "With 64 lights, which method has the smaller shading error, and by how much?",

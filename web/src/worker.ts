@@ -7,7 +7,17 @@ const SLICE = 16;
 
 let engine: Engine | undefined;
 let memory: WebAssembly.Memory | undefined;
-let rendering: { token: number; paused: boolean } | undefined;
+let rendering: Rendering | undefined;
+/** A render in progress, and where it is to end. */
+interface Rendering {
+  token: number;
+  paused: boolean;
+  rays: number;
+  /** Shadow rays per millisecond, and those of the last single tile; 0 if unknown. */
+  rate: number;
+  ofTile: number;
+  budget: number;
+}
 /** The earliest time of the next variance estimate; estimates take at most a thirtieth of the time. */
 let nextVariance = 0;
 const pending: ToWorker[] = [];
@@ -73,7 +83,7 @@ function answer(message: ToWorker) {
       if (pending.some((other) => other.kind === "render")) break;
       try {
         const started = JSON.parse(engine!.start(message.settings));
-        rendering = { token: message.token, paused: false };
+        rendering = { token: message.token, paused: false, rays: 0, rate: 0, ofTile: 0, budget: Infinity };
         nextVariance = 0;
         post({ kind: "started", token: message.token, strategy: started.strategy });
       } catch (error) {
@@ -81,6 +91,10 @@ function answer(message: ToWorker) {
         post({ kind: "failed", token: message.token, error: text(error), dead: isDead(error) });
       }
       soon();
+      break;
+    case "budget":
+      if (rendering?.token === message.token) Object.assign(rendering, { budget: message.rays, paused: false });
+      else post({ kind: "spent", token: message.token });
       break;
     case "stop":
       rendering = undefined;
@@ -101,24 +115,36 @@ function call(name: Call, args: unknown[]): unknown {
 
 /** Converts the engine's picture for a message. */
 function plain(view: MapView) {
-  const picture = { width: view.width, height: view.height, pixels: view.pixels() };
+  const picture = { width: view.width, height: view.height, pixels: view.pixels(), integrals: view.integrals() };
   view.free();
   return picture;
 }
 
 function slice() {
-  const { token } = rendering!;
+  const now = rendering!, { token } = now, left = now.budget - now.rays;
+  // Stop at the tile whose end is nearest to the budget.
+  if (left <= 0.5 * now.ofTile) {
+    now.paused = true;
+    now.budget = Infinity;
+    post({ kind: "spent", token });
+    return;
+  }
+  // Near the end, render single tiles.
+  const isNear = left < 2 * SLICE * now.rate;
   try {
-    const update = engine!.step(SLICE);
+    const begin = performance.now(), update = engine!.step(isNear ? 0 : SLICE), milliseconds = performance.now() - begin;
     const windows = update.windows(), pixels = update.pixels();
-    const { complete, progress } = update;
+    const { complete, progress, whole } = update;
     update.free();
     const before = performance.now(), withVariance = complete || before >= nextVariance;
     const statistics = JSON.parse(engine!.statistics(withVariance));
     if (withVariance) nextVariance = performance.now() + 30 * (performance.now() - before);
+    const rays = statistics.shadowRays - now.rays;
+    Object.assign(now, { rays: statistics.shadowRays, rate: rays / Math.max(milliseconds, 0.1), ofTile: isNear ? rays : 0 });
     if (complete) rendering = undefined;
-    post({ kind: "update", token, windows, pixels, complete, progress, statistics }, [windows.buffer as ArrayBuffer, pixels.buffer as ArrayBuffer]);
+    post({ kind: "update", token, windows, pixels, complete, progress, whole, milliseconds, statistics }, [windows.buffer as ArrayBuffer, pixels.buffer as ArrayBuffer]);
     if (!complete) soon();
+    else if (now.budget < Infinity) post({ kind: "spent", token });
   } catch (error) {
     rendering = undefined;
     post({ kind: "failed", token, error: text(error), dead: isDead(error) });

@@ -14,19 +14,32 @@ const VIEWS = [
   ["map", "panel=map&layer=target&strategy=mis:1:1"], ["map-angular", "panel=map&mapping=angular&layer=product&samples=6"], ["xray", "panel=xray"],
   ["lights", "panel=lights"], ["lights-steps", "panel=lights&refine=false&lights=12"], ["link", "scene=robot.glb&env=yard.hdr"],
   ...Array.from({ length: 15 }, (_, i) => [`lecture-${String(i + 1).padStart(2, "0")}`, `panel=lecture&step=${i + 1}`]),
+  ["embed", "panel=lecture&step=9", "?embed=step"],
 ];
+
+const STEPS = Array.from({ length: 15 }, (_, i) => i + 1);
+const wanted = (name) => !only.length || only.some((panel) => name.startsWith(panel));
 
 mkdirSync(folder, { recursive: true });
 await launch();
-for (const [name, hash] of VIEWS.filter(([name]) => !only.length || only.some((panel) => name.startsWith(panel)))) {
+for (const [name, hash, query] of VIEWS.filter(([name]) => wanted(name))) {
   for (const width of WIDTHS) {
     for (const colorScheme of ["light", "dark"]) {
-      const { page, done } = await open(`${STATE}&${hash}`, { viewport: { width, height: 900 }, colorScheme, reducedMotion: "reduce" });
-      await rendered(page);
+      const { page, done } = await open(`${STATE}&${hash}`, { query, viewport: { width, height: 900 }, colorScheme, reducedMotion: "reduce" });
+      if (!query) await rendered(page);
       await page.waitForTimeout(1500);
       await page.screenshot({ path: join(folder, `${name}-${width}-${colorScheme}.png`), fullPage: true });
       await done();
     }
   }
+}
+// The lecture as a room sees it.
+for (const step of STEPS.filter((step) => wanted(`present-${String(step).padStart(2, "0")}`))) {
+  const { page, done } = await open(`${STATE}&panel=lecture&step=${step}`, { viewport: { width: 1920, height: 1080 }, reducedMotion: "reduce" });
+  await page.waitForSelector("#figure[data-drawn]");
+  await page.keyboard.press("f");
+  await page.waitForTimeout(1500);
+  await page.screenshot({ path: join(folder, `present-${String(step).padStart(2, "0")}.png`) });
+  await done();
 }
 await close();

@@ -86,10 +86,10 @@ test("exposure, curve and material change the picture", async () => {
 });
 
 test("two strategies at equal rays, with a divider", async () => {
-  const { page, done } = await open("size=96&spp=16&rows=64&strategy=brdf:4&beside=mis:1:1");
+  const { page, done } = await open("size=256&spp=8&rows=64&strategy=brdf:4&beside=product:8");
   await rendered(page);
   assert.ok(await page.isVisible("#divider"));
-  assert.equal(await text(page, "#tag-right"), "mis:1:1");
+  assert.equal(await text(page, "#tag-right"), "product:8");
   const half = await canvasHash(page, "film");
   await page.focus("#divider");
   await page.keyboard.press("Home");
@@ -98,7 +98,65 @@ test("two strategies at equal rays, with a divider", async () => {
   const left = await canvasHash(page, "film");
   assert.ok(new Set([half, left, right]).size === 3);
   const rays = await page.evaluate(() => window.domelight.picture.jobs.map((job) => job.statistics.shadowRays));
-  assert.ok(Math.abs(rays[0] / rays[1] - 1) < 0.1, `rays ${rays}`);
+  assert.ok(Math.abs(rays[0] / rays[1] - 1) < 0.02, `rays ${rays}`);
+  await done();
+});
+
+test("errors are measured at whole passes against a reference that is made by itself and kept", async () => {
+  const { page, done } = await open("size=64&spp=16&rows=64&env=studio&strategy=mis:1:1");
+  const measured = () => page.waitForSelector("figure[data-error=measured]");
+  await rendered(page);
+  await measured();
+  await page.waitForFunction(() => { const { reference } = window.domelight.picture; return reference.isReady && !reference.running; });
+  const read = () => page.evaluate(() => {
+    const { jobs, reference } = window.domelight.picture, points = window.domelight.picture.measured()[0];
+    return { points: points.map(({ rays, error }) => [rays, error]), rays: jobs[0].statistics.shadowRays, renders: reference.renders, variance: jobs[0].statistics.relativeVariance };
+  });
+  const first = await read();
+  // Passes of 1, 1, 2, 4 and 8 samples.
+  assert.equal(first.points.length, 5, JSON.stringify(first));
+  assert.equal(first.points.at(-1)[0], first.rays);
+  for (const [i, [rays, error]] of first.points.entries()) {
+    if (i) assert.ok(rays > first.points[i - 1][0] && error < first.points[i - 1][1], JSON.stringify(first.points));
+  }
+  const last = first.points.at(-1)[1];
+  assert.ok(last > 0.5 * first.variance && last < 2 * first.variance, `measured ${last}, estimated ${first.variance}`);
+  const caption = await text(page, "#picture figcaption");
+  assert.match(caption, /measured against a reference of \d+ independent renders .*: mis:1:1 has [\d.]+ ± [\d.]+, slope −0\.[3-9]\d ± 0\.\d\d/);
+  assert.equal((await page.$$("#error-plot circle.first")).length, 5);
+  // The same link has the same numbers, and another strategy the same reference.
+  await renderedAnew(page, () => page.evaluate(() => window.domelight.app.set({ strategy: "brdf:2" })));
+  await measured();
+  assert.equal((await read()).renders >= first.renders, true);
+  const again = await open("size=64&spp=16&rows=64&env=studio&strategy=mis:1:1");
+  await rendered(again.page);
+  await again.page.waitForFunction(() => { const { reference } = window.domelight.picture; return reference.isReady && !reference.running; });
+  await again.page.waitForTimeout(300);
+  assert.equal(await text(again.page, "#picture figcaption"), caption);
+  await again.done();
+  await done();
+});
+
+test("a biased strategy is measured with its bias, which its variance does not show", async () => {
+  const { page, done } = await open("size=64&spp=16&rows=64&strategy=median-cut:16");
+  await rendered(page);
+  await page.waitForSelector("figure[data-error=measured]");
+  const [measured, estimated] = await page.evaluate(() => {
+    const { picture } = window.domelight;
+    return [picture.measured()[0].at(-1).error, picture.jobs[0].statistics.relativeVariance];
+  });
+  assert.ok(measured > 2 * estimated, `measured ${measured}, estimated ${estimated}`);
+  await done();
+});
+
+test("without a reference the error is called an estimate", async () => {
+  const { page, done } = await open("size=64&spp=16&rows=64&strategy=mis:1:1&camera=null");
+  await page.evaluate(() => { window.domelight.app.reference = () => Promise.reject(new Error("no memory")); });
+  await renderedAnew(page, () => page.evaluate(() => window.domelight.app.set({ rotate: 10 })));
+  await page.waitForFunction(() => /no memory/.test(document.querySelector("#picture figcaption").textContent));
+  assert.match(await text(page, "#picture figcaption"), /^An estimate from the variance of the samples/);
+  assert.match(await text(page, "#error-plot"), /mis:1:1, variance/);
+  assert.ok(await page.$("#error-plot .dashed"));
   await done();
 });
 
@@ -121,18 +179,14 @@ test("the plot of the error pairs each estimate with the rays that it is of", as
 
 test("the error view measures the picture against a reference", async () => {
   const { page, done } = await open("size=64&spp=32&rows=64&env=studio&strategy=mis:1:1&beside=product:8&view=error");
-  await page.waitForFunction(() => /Relative squared error: mis:1:1/.test(document.getElementById("error-legend").textContent));
   await rendered(page);
-  await page.waitForFunction(() => {
-    const { films, reference } = window.domelight.picture;
-    return reference.statistics.samples >= 16 && reference.variance < 0.1 * reference.error(films[1]);
-  });
+  await page.waitForFunction(() => /The reference has \d+ samples/.test(document.getElementById("error-legend").textContent));
+  await page.waitForFunction(() => window.domelight.picture.reference.renders >= 8 || !window.domelight.picture.reference.running);
   const sides = await page.evaluate(() => {
-    const { films, jobs, reference } = window.domelight.picture;
-    return films.map((film, i) => [reference.error(film), jobs[i].statistics.relativeVariance]);
+    const { picture } = window.domelight;
+    return picture.measured().map((points, i) => [points.at(-1).error, picture.jobs[i].statistics.relativeVariance]);
   });
   for (const [measured, estimated] of sides) assert.ok(measured > 0.3 * estimated && measured < 3 * estimated, `measured ${measured}, estimated ${estimated}`);
-  assert.equal((await page.$$("#error-plot circle")).length, 2);
   const errors = await canvasHash(page, "film");
   await page.selectOption("#view", "picture");
   assert.ok(await page.isHidden("#error-legend"));
@@ -144,9 +198,9 @@ test("without WebGL2 the error view is the same", async () => {
   const seen = [];
   for (const query of ["", "?2d"]) {
     const { page, done } = await open("size=64&spp=1&rows=64&env=studio&strategy=brdf:1&view=error", { query });
-    await page.waitForFunction(() => document.getElementById("error-plot").querySelector("circle"));
-    await page.evaluate(() => window.domelight.picture.reference.settle(1e9));
-    await page.waitForTimeout(200);
+    await page.waitForFunction(() => { const { reference } = window.domelight.picture; return reference.isReady && !reference.running; });
+    await page.evaluate(() => window.domelight.picture.reference.stop());
+    await page.waitForTimeout(300);
     seen.push(await brightness(page, "film"));
     await done();
   }
@@ -210,6 +264,30 @@ test("samples and layers are drawn in every layout of the map", async () => {
     assert.deepEqual(marks, map);
   }
   await page.waitForFunction(() => /layer=sir/.test(location.hash) && /mapping=/.test(location.hash));
+  await done();
+});
+
+test("densities on the map integrate to one, also under a sky with a small sun", async () => {
+  const { page, done } = await open("size=64&spp=1&rows=256&panel=map&pixel=[27,27]&strategy=mis:1:1", { reducedMotion: "reduce" });
+  for (const mapping of ["lat-long", "angular", "octahedral"]) {
+    await page.selectOption("#mapping", mapping);
+    await page.waitForSelector("html[data-samples]");
+    for (const [layer, least] of [["environment", 0.995], ["target", 0.995], ["mis", 0.5], ["brdf", 0.5], ["sir", 0.995]]) {
+      await page.selectOption("#layer", layer);
+      await page.waitForSelector(`html[data-layer="${layer} ${mapping}"]`, { state: "attached" });
+      await page.waitForFunction(() => /∫ p dω/.test(document.getElementById("point-table").textContent));
+      const stated = Number(/∫ p dω(.*)/.exec(await text(page, "#point-table"))?.[1]);
+      assert.ok(stated >= least && stated <= 1.005, `${layer} on ${mapping}: ${stated}`);
+      if (mapping !== "lat-long") continue;
+      // What is drawn: the mean of each texel, over the texels' solid angles.
+      const drawn = await page.evaluate(() => {
+        const { values, width, height } = window.domelight.map.layer();
+        const edge = (y) => Math.cos(Math.PI * y / height);
+        return values.reduce((sum, p, i) => sum + p * (edge(Math.floor(i / width)) - edge(Math.floor(i / width) + 1)) * 2 * Math.PI / width, 0);
+      });
+      assert.ok(Math.abs(drawn - stated) < 0.01, `${layer}: ${drawn} is drawn, ${stated} is stated`);
+    }
+  }
   await done();
 });
 
@@ -444,17 +522,88 @@ test("the first step of the lecture plays, pauses, steps, is dragged and read", 
   await done();
 });
 
-test("samples and candidates play", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture`);
-  for (const step of [5, 7, 11]) {
-    await page.click(`#steps li:nth-child(${step}) a`);
+/** Steps and the place in their first plot or map, as shares of it, where something can be dragged, and to where. */
+const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[0.45, 0.5], [0.35, 0.5]], 4: [[0.4, 0.4], [0.25, 0.6]], 5: [[0.6, 0.5], [0.4, 0.5]],
+  6: [[0.5, 0.3], [0.5, 0.7]], 7: [[0.3, 0.3], [0.6, 0.5]], 8: [[0.6, 0.5], [0.8, 0.5]], 9: [[0.6, 0.5], [0.75, 0.5]], 10: [[0.5, 0.7], [0.5, 0.4]], 11: [[0.5, 0.5], [0.7, 0.5]],
+  13: [[0.4, 0.5], [0.6, 0.5]], 14: [[0.3, 0.3], [0.6, 0.6]], 15: [[0.3, 0.3], [0.6, 0.6]] };
+
+for (let step = 1; step <= 15; step++) {
+  test(`the figure of step ${step} plays, pauses, is dragged and read`, async () => {
+    const { page, done } = await open(`${SMALL}&panel=lecture&step=${step}`);
     await page.waitForSelector(`html[data-step='${step}']`);
     await drawn(page, 1);
-    const before = await figureOf(page);
-    await page.click('#figure .player button:text-is("Play")');
-    await drawn(page, 3);
-    assert.notEqual(await figureOf(page), before, `step ${step}`);
+    const times = () => page.$eval("#figure", (figure) => Number(figure.dataset.drawn));
+    const button = (name) => page.locator(`#figure .player button:text-is("${name}")`).first();
+    // From its last step, a figure would start over.
+    await page.$eval("#figure .player", (player) => {
+      const input = player.previousElementSibling.querySelector("input");
+      input.value = input.min;
+      input.dispatchEvent(new Event("input", { bubbles: true }));
+    });
+    await page.waitForTimeout(300);
+    const before = await figureOf(page), n = await times();
+    await button("Play").click();
+    await drawn(page, n + 2);
+    await button("Pause").click();
+    await page.waitForTimeout(400);
+    const paused = await figureOf(page);
+    assert.notEqual(paused, before, "it plays");
+    await page.waitForTimeout(400);
+    assert.equal(await figureOf(page), paused, "a paused figure stands still");
+    const framed = page.locator("#figure [data-frame]").first();
+    await framed.scrollIntoViewIfNeeded();
+    const box = await framed.boundingBox(), at = ([x, y]) => [box.x + x * box.width, box.y + y * box.height];
+    const [from, to] = DRAGS[step] ?? [[0.5, 0.5], [0.5, 0.4]];
+    const read = () => page.$eval("#figure", (figure) => (figure.querySelector(".readout").textContent.trim() || figure.querySelector(".result").textContent));
+    await page.mouse.move(...at(from));
+    await page.waitForFunction((step) => /\d/.test(document.querySelector("#figure .readout").textContent) || (step === 1 && /^Under the pointer/.test(document.querySelector("#figure .result").textContent)), step);
+    const readAt = await read();
+    assert.doesNotMatch(readAt, /NaN|undefined|Infinity/);
+    if (DRAGS[step]) {
+      const values = () => page.$$eval("#figure input", (all) => all.map(({ value }) => value).join(" "));
+      const [set, shown] = [await values(), await figureOf(page)];
+      await page.mouse.down();
+      await page.mouse.move(...at(to), { steps: 3 });
+      await page.mouse.up();
+      await page.waitForTimeout(300);
+      assert.notEqual(await figureOf(page), shown, "dragging changes the figure");
+      if (![7, 14, 15].includes(step)) assert.notEqual(await values(), set, "dragging moves a slider");
+    } else await page.mouse.move(...at(to));
+    await page.waitForTimeout(200);
+    assert.notEqual(await read(), readAt, "other places have other values");
+    await done();
+  });
+}
+
+test("the answer of step 12 is what its figure shows, with the repeats' standard errors", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture&step=12&figure=counts;0;3`);
+  await drawn(page, 1);
+  const captions = await page.$$eval("#figure figcaption", (all) => all.map((caption) => caption.textContent));
+  for (const caption of captions) assert.match(caption, /error [\d.·⁻⁰-⁹10]+ ± .* s$/);
+  const answer = () => text(page, "#step details p");
+  assert.match(await answer(), /^For each ray, that is by error times rays, (\w+ has the least error|\w+ and \w+ cannot be told apart)/);
+  const n = await page.$eval("#figure", (figure) => Number(figure.dataset.drawn));
+  await page.selectOption("#figure select", "time");
+  await drawn(page, n + 1);
+  assert.match(await answer(), /^At equal time, /);
+  await done();
+});
+
+test("step 9 names the density with the least variance, which is not the product where most of it is occluded", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture&step=9`);
+  await drawn(page, 1);
+  const seen = new Set();
+  for (const edge of [1, 0.6, 0.45, 0.38, 0.34]) {
+    const n = await page.$eval("#figure", (figure) => Number(figure.dataset.drawn));
+    await page.$$eval("#figure input", (all, edge) => { all[2].value = String(edge); all[2].dispatchEvent(new Event("input", { bubbles: true })); }, edge);
+    await drawn(page, n + 1);
+    const result = await text(page, "#figure .result");
+    const numbers = Object.fromEntries(["light", "lobe", "product"].map((name) => [name, Number(new RegExp(`${name} ([\\d.]+)`).exec(result)[1])]));
+    const least = /least here: ([\w ]+)/.exec(result)[1];
+    assert.ok(least === "all alike" || least.split(" and ").every((name) => numbers[name] <= Math.min(...Object.values(numbers)) + 1e-3), result);
+    seen.add(least);
   }
+  assert.ok([...seen].some((least) => !least.includes("product") && least !== "all alike"), [...seen].join("; "));
   await done();
 });
 
@@ -472,6 +621,14 @@ test("a teacher presents: F, PageDown, arrow keys, and labels of 24 px", async (
     await page.waitForSelector(`html[data-step='${step}']`);
     await page.waitForSelector("#figure svg text");
     assert.ok(await label() >= 24, `step ${step}: ${await label()} px`);
+  }
+  // Question and figure of every step are on the screen.
+  for (let step = 2; step <= 15; step++) {
+    await page.keyboard.press("PageDown");
+    await page.waitForSelector(`html[data-step='${step}']`);
+    await drawn(page, 1);
+    const end = await page.evaluate(() => Math.max(...[...document.querySelectorAll("#step .question, #figure > div")].map((part) => part.getBoundingClientRect().bottom)));
+    assert.ok(end <= 1080, `step ${step} ends at ${end} px`);
   }
   await page.keyboard.press("f");
   await page.waitForSelector("html:not([data-presenting])");
@@ -534,6 +691,57 @@ test("on paper the answers are open and the page is light", async () => {
   assert.ok((await page.pdf()).length > 10_000);
   await page.emulateMedia({ media: "screen", colorScheme: "dark" });
   await page.waitForFunction(() => !document.querySelector("#step details").open);
+  await done();
+});
+
+test("the picture stays in sight while its controls are used", async () => {
+  for (const [width, height] of [[1280, 800], [1366, 768], [390, 844]]) {
+    const { page, done } = await open(SMALL, { viewport: { width, height } });
+    await rendered(page);
+    for (const control of ["#scene", "#spp", "#seed", "#copy-command"]) {
+      await page.focus(control);
+      await page.locator(control).scrollIntoViewIfNeeded();
+      const seen = await page.evaluate((control) => {
+        const viewer = document.getElementById("viewer").getBoundingClientRect(), own = document.querySelector(control).getBoundingClientRect();
+        const shown = Math.min(viewer.bottom, innerHeight) - Math.max(viewer.top, 0);
+        const covered = document.elementFromPoint(own.left + own.width / 2, own.top + own.height / 2);
+        return { share: shown / viewer.height, onTop: !!covered?.closest(control) };
+      }, control);
+      assert.ok(seen.share > 0.9, `${control} at ${width} × ${height}: ${Math.round(100 * seen.share)} % of the picture is seen`);
+      assert.ok(seen.onTop, `${control} at ${width} × ${height} is not covered`);
+    }
+    await done();
+  }
+});
+
+test("sliders say their values as they are written", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture&step=2`);
+  await drawn(page, 1);
+  await slide(page, "#figure input", 50);
+  const said = await page.$$eval("#figure input", (all) => all.map((input) => [input.getAttribute("aria-valuetext"), input.closest("label").querySelector("output").textContent]));
+  for (const [spoken, written] of said) assert.equal(spoken, written);
+  await show(page, "picture");
+  await page.waitForFunction(() => /EV/.test(document.getElementById("exposure").getAttribute("aria-valuetext")));
+  await done();
+});
+
+test("all steps are printed, with and without answers", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture`, { script: "window.print = () => { window.printed = true; };" });
+  for (const answers of [true, false]) {
+    await page.setChecked("#with-answers", answers);
+    await page.click("#print-all");
+    await page.waitForFunction(() => window.printed);
+    const steps = await page.$$eval("#handout article", (all) => all.map((article) => [!!article.querySelector(".figure :is(svg, canvas)"), article.querySelector(".result").textContent, !!article.querySelector("details"), article.querySelector(".address").textContent]));
+    assert.equal(steps.length, 15);
+    for (const [i, [figure, result, answer, address]] of steps.entries()) {
+      assert.ok(figure && /\d/.test(result), `step ${i + 1} has its figure`);
+      assert.equal(answer, answers);
+      assert.match(address, i ? new RegExp(`step=${i + 1}$`) : /panel=lecture/);
+    }
+    assert.ok((await page.pdf()).length > 50_000);
+    await page.evaluate(() => { window.printed = false; dispatchEvent(new Event("afterprint")); });
+    assert.equal(await page.locator("#handout article").count(), 0);
+  }
   await done();
 });
 
@@ -665,6 +873,42 @@ test("a hash of nonsense is the default picture", async () => {
   await rendered(page);
   assert.equal(await page.inputValue("#scene"), "statue");
   await done();
+});
+
+test("a wrong link shows the defaults and says what is wrong", async () => {
+  const { page, done } = await open(`${SMALL}&curve=nope&what=1&pixel=[1]&strategy=velvet:3`);
+  await rendered(page);
+  assert.match(await text(page, "#wrong"), /curve=nope|strategy=velvet/);
+  await page.waitForFunction(() => /strategy=velvet:3/.test(document.getElementById("wrong").textContent));
+  assert.equal(await page.evaluate(() => window.domelight.app.state.strategy), "product:8");
+  await page.evaluate(() => { location.hash = "size=64&spp=1&rows=64&panel=nowhere&step=99"; });
+  await page.waitForFunction(() => /panel=nowhere, step=99/.test(document.getElementById("wrong").textContent));
+  await renderedAnew(page, () => page.selectOption("#scene", "sphere"));
+  assert.ok(await page.isHidden("#wrong"), "a change takes the message away");
+  await done();
+});
+
+test("another page shows a step alone", async () => {
+  const { page, done } = await open("panel=lecture&step=9&figure=0.4", { query: "?embed=step" });
+  await drawn(page, 1);
+  assert.match(await text(page, "#step h2"), /product/);
+  assert.equal(await page.$eval("#figure input", ({ value }) => value), "0.4");
+  for (const hidden of ["#tabs", "#steps", "#picture", "#step .steps"]) assert.ok(await page.isHidden(hidden), hidden);
+  assert.equal(await page.evaluate(() => window.domelight.picture.jobs.length), 0, "no picture is rendered");
+  await done();
+  const whole = await open(`${SMALL}&panel=lecture&step=9`);
+  await drawn(whole.page, 1);
+  await whole.page.evaluate(() => {
+    document.querySelector("meta[name=base]").content = "https://example.org/domelight.html";
+    window.copied = [];
+    navigator.clipboard.writeText = async (text) => { window.copied.push(text); };
+  });
+  await whole.page.click("#copy-step");
+  await whole.page.click("#copy-embed");
+  const [link, html] = await whole.page.evaluate(() => window.copied);
+  assert.match(link, /^https:\/\/example\.org\/domelight\.html#.*panel=lecture.*step=9$/);
+  assert.match(html, /^<iframe src="https:\/\/example\.org\/domelight\.html\?embed=step#[^"]*step=9" title="The product is the target"/);
+  await whole.done();
 });
 
 test("words that a link cannot have are the defaults", async () => {

@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use domelight::Rgb;
 use domelight::environment::mapping::{Mapping, UnknownMapping};
-use domelight::environment::{LatLongGrid, Orientation, UpAxis};
+use domelight::environment::{Environment, LatLongGrid, Orientation, UpAxis};
 use domelight::math::{Vec3, vec2};
 use domelight::render::visibility;
 use domelight::sampling::{Sampler, SamplerKind};
@@ -80,7 +80,7 @@ impl Texels {
             layers.iter_mut().zip(values).for_each(|(layer, value)| layer.push(value));
         }
         let [width, height] = self.size;
-        MapView { width, height, pixels: layers.concat() }
+        MapView { width, height, pixels: layers.concat(), integrals: Vec::new() }
     }
 }
 
@@ -101,6 +101,51 @@ fn directions(width: usize) -> impl Iterator<Item = (Vec3, f64)> {
     let texels = Texels::new(Mapping::LatLong, width, UpAxis::Y).directions;
     let solid_angle = move |i: usize| grid.solid_angle(i / width);
     texels.into_iter().enumerate().filter_map(move |(i, d)| Some((d?, solid_angle(i))))
+}
+
+/// A part of the sphere of directions that is no larger than the map's texels, or a block of them.
+struct Cell {
+    /// Its center, world.
+    center: Vec3,
+    solid_angle: f64,
+    /// The means of the light, in the map's units, and of its density \[sr⁻¹\].
+    light: Rgb,
+    density: f32,
+}
+
+/// Divides the sphere into cells along the map's own texels, so that no small sun falls between them: at least
+/// `FINEST` columns, parts of texels of a smaller map and blocks of a map more than twice as wide.
+fn cells(environment: &Environment) -> impl Iterator<Item = Cell> {
+    const FINEST: usize = 1024;
+    let map = environment.map();
+    let parts = FINEST.div_ceil(map.width);
+    let block = (map.width / FINEST).max(1);
+    let [width, height] = [map.width * parts, map.height * parts];
+    let grid = LatLongGrid::new(width, height);
+    let to_world = environment.orientation().map_to_world();
+    let direction = move |x: f32, y: f32| {
+        let uv = vec2(x / width as f32, y / height as f32);
+        to_world * Mapping::LatLong.direction(uv).unwrap_or(Vec3::Y)
+    };
+    let corners = move |n: usize| (0..n).step_by(block);
+    let corners = corners(height).flat_map(move |y| corners(width).map(move |x| [x, y]));
+    corners.map(move |[x, y]| {
+        let [right, bottom] = [(x + block).min(width), (y + block).min(height)];
+        let (mut solid_angle, mut light, mut density) = (0.0, Rgb::BLACK, 0.0);
+        for row in y..bottom {
+            let w = grid.solid_angle(row);
+            for column in x..right {
+                let center = direction(column as f32 + 0.5, row as f32 + 0.5);
+                let (le, pdf) = environment.le_pdf(center);
+                solid_angle += w;
+                light += le * w as f32;
+                density += pdf * w as f32;
+            }
+        }
+        let center = direction(0.5 * (x + right) as f32, 0.5 * (y + bottom) as f32);
+        let scale = (1.0 / solid_angle) as f32;
+        Cell { center, solid_angle, light: light * scale, density: density * scale }
+    })
 }
 
 /// Shadow rays counted in cells of a lat-long map.
@@ -136,6 +181,11 @@ impl RayCounts {
         let [x, y] = self.cell(direction);
         let solid_angle = self.grid.solid_angle(y) as f32;
         self.counts[y * self.size[0] + x] / (self.n_rays.max(1.0) * solid_angle)
+    }
+
+    /// The integral of the density over the sphere.
+    fn integral(&self) -> f64 {
+        self.counts.iter().map(|&n| f64::from(n)).sum::<f64>() / f64::from(self.n_rays.max(1.0))
     }
 }
 
@@ -198,11 +248,12 @@ pub struct MapView {
     /// Rows.
     pub height: usize,
     pixels: Vec<f32>,
+    integrals: Vec<f64>,
 }
 
 impl MapView {
     fn empty() -> Self {
-        Self { width: 0, height: 0, pixels: Vec::new() }
+        Self { width: 0, height: 0, pixels: Vec::new(), integrals: Vec::new() }
     }
 }
 
@@ -211,6 +262,11 @@ impl MapView {
     /// R, G, B and alpha, or layer by layer, row by row.
     pub fn pixels(&self) -> Vec<f32> {
         self.pixels.clone()
+    }
+
+    /// The integral of each layer over the sphere, where the layers have integrals.
+    pub fn integrals(&self) -> Vec<f64> {
+        self.integrals.clone()
     }
 }
 
@@ -279,7 +335,7 @@ impl Engine {
             let Rgb { r, g, b } = if inside > 0.0 { sum / inside } else { Rgb::BLACK };
             pixels.extend([r, g, b, f32::from(u8::from(inside > 0.0))]);
         }
-        Ok(MapView { width, height, pixels })
+        Ok(MapView { width, height, pixels, integrals: Vec::new() })
     }
 
     /// Where places of the map as the probe has it lie in a mapping, upright in the world, if the map is turned by
@@ -307,35 +363,68 @@ impl Engine {
 
     /// What the light, the material and visibility are of every direction at a pixel: seven layers in a mapping, upright
     /// in the world: L, f · cos θ and V (luminance), the densities of environment, BRDF and multiple importance sampling
-    /// with as many samples of each, and f · cos θ · L over its integral \[sr⁻¹\]. Empty where the pixel shows no
-    /// surface.
+    /// with as many samples of each, and f · cos θ · L over its integral \[sr⁻¹\]. Each texel but those of V is the mean
+    /// over the map's texels inside, so that no sun falls between them, and the layers' sums are their integrals. Empty
+    /// where the pixel shows no surface.
     ///
     /// # Errors
     /// If scene or environment are missing, or there is no such mapping.
     pub fn importance(&self, pixel: &str, mapping: &str, width: usize) -> Result<MapView, JsError> {
+        const VISIBILITY: usize = 2;
         let mapping = mapping_of(mapping)?;
         let Some(picked) = self.pick(pixel)? else { return Ok(MapView::empty()) };
         let environment = self.environment()?;
         let unit = environment.unit() as f32;
-        let light = |wi: Vec3| (picked.at.eval(wi) * environment.le(wi)).luminance();
-        let integral: f64 = directions(256).map(|(wi, w)| f64::from(light(wi)) * w).sum();
-        let scale = if integral > 0.0 { (1.0 / integral) as f32 } else { 0.0 };
-        let texels = Texels::new(mapping, width, environment.orientation().up);
+        let layers = |wi: Vec3, light: Rgb, of_light: f32| {
+            let (f, of_brdf) = picked.at.eval_pdf(wi);
+            let mixture = 0.5 * (of_light + of_brdf);
+            let product = (f * light).luminance();
+            [light.luminance() * unit, f.luminance(), 0.0, of_light, of_brdf, mixture, product]
+        };
+        let up = environment.orientation().up;
+        let texels = Texels::new(mapping, width, up);
+        let [columns, rows] = texels.size;
+        let n = columns * rows;
+        let from_world = up.from_y_up().transpose();
+        let texel = |wi: Vec3| {
+            let uv = mapping.uv(from_world * wi);
+            let at = |c: f32, n: usize| ((c * n as f32) as usize).min(n - 1);
+            at(uv.y, rows) * columns + at(uv.x, columns)
+        };
+        // Add up the cells in each texel, and on the sphere.
+        let (mut sums, mut solid_angles) = (vec![[0.0; 7]; n], vec![0.0; n]);
+        let mut integrals = [0.0; 7];
+        for Cell { center, solid_angle, light, density } in cells(environment) {
+            let i = texel(center);
+            solid_angles[i] += solid_angle;
+            for (k, value) in layers(center, light, density).into_iter().enumerate() {
+                sums[i][k] += f64::from(value) * solid_angle;
+                integrals[k] += f64::from(value) * solid_angle;
+            }
+        }
+        // The product becomes a density.
+        let [.., total] = integrals;
+        let scale = if total > 0.0 { 1.0 / total } else { 0.0 };
+        integrals[6] = total * scale;
         let all: Vec<Vec3> = texels.directions.iter().flatten().copied().collect();
         let mut visibility = picked.visibility(&all).into_iter();
-        Ok(texels.layers(|wi| {
-            let (le, of_light) = environment.le_pdf(wi);
-            let (f, of_brdf) = picked.at.eval_pdf(wi);
-            [
-                le.luminance() * unit,
-                f.luminance(),
-                visibility.next().unwrap_or(0.0),
-                of_light,
-                of_brdf,
-                0.5 * (of_light + of_brdf),
-                (f * le).luminance() * scale,
-            ]
-        }))
+        let mut pixels = vec![0.0; 7 * n];
+        for (i, direction) in texels.directions.iter().enumerate() {
+            let Some(wi) = *direction else { continue };
+            let mut values = if solid_angles[i] > 0.0 {
+                sums[i].map(|sum| sum / solid_angles[i])
+            } else {
+                // A texel that is smaller than the cells.
+                let (le, pdf) = environment.le_pdf(wi);
+                layers(wi, le, pdf).map(f64::from)
+            };
+            values[6] *= scale;
+            let v = f64::from(visibility.next().unwrap_or(0.0));
+            values[VISIBILITY] = v;
+            integrals[VISIBILITY] += v * solid_angles[i];
+            values.iter().enumerate().for_each(|(k, &value)| pixels[k * n + i] = value as f32);
+        }
+        Ok(MapView { width: columns, height: rows, pixels, integrals: integrals.to_vec() })
     }
 
     /// Where a strategy sends its shadow rays from a pixel, counted over many camera samples: rays per solid angle and
@@ -366,7 +455,8 @@ impl Engine {
             shadow_rays(&picked.at, &strategy, SAMPLES, seed, visible, count);
         }
         let texels = Texels::new(mapping, width, environment.orientation().up);
-        Ok(texels.layers(|wi| [counts.density(wi)]))
+        let view = texels.layers(|wi| [counts.density(wi)]);
+        Ok(MapView { integrals: vec![counts.integral()], ..view })
     }
 
     /// The surface at a pixel and its light, as JSON; `null` where there is none.

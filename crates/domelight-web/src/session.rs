@@ -101,6 +101,8 @@ pub struct Update {
     pub complete: bool,
     /// The share of the camera samples that is done, in [0, 1].
     pub progress: f64,
+    /// The samples of each pixel before adaptive division, if all have as many: at the end of a pass. 0 within one.
+    pub whole: u32,
 }
 
 #[wasm_bindgen]
@@ -194,7 +196,7 @@ impl Engine {
         Ok(to_json(&started))
     }
 
-    /// Renders for so many milliseconds, or until all samples are there; the pixels that changed.
+    /// Renders for so many milliseconds, or until a pass ends; the pixels that changed.
     ///
     /// # Errors
     /// If nothing was started.
@@ -203,7 +205,10 @@ impl Engine {
         let session = self.session.as_mut().ok_or_else(nothing_started)?;
         Ok(session.with_dependent_mut(|_, renderer| {
             let before = renderer.mark();
-            let complete = renderer.run(&deadline);
+            renderer.step_with(&deadline);
+            let complete = renderer.is_complete();
+            let is_whole = complete || renderer.share_behind() == 1.0;
+            let whole = if is_whole { renderer.least_samples() } else { 0 };
             let (mut windows, mut pixels) = (Vec::new(), Vec::new());
             for window in renderer.changed_since(before) {
                 let Window { x, y, width, height } = window;
@@ -212,7 +217,7 @@ impl Engine {
                 let colors = color.pixels.iter().zip(&alpha);
                 pixels.extend(colors.flat_map(|(c, &alpha)| [c.r, c.g, c.b, alpha]));
             }
-            Update { windows, pixels, complete, progress: renderer.progress() }
+            Update { windows, pixels, complete, progress: renderer.progress(), whole }
         }))
     }
 

@@ -1,0 +1,139 @@
+// Step 12: four ways to sample the direct illumination of a sphere, measured with repeats.
+
+import { h, short } from "../dom";
+import { Film, FilmView, luminance } from "../film";
+import { pixels } from "../pointer";
+import type { Stage } from "../stage";
+
+/** The four ways: name, counts, the strategy at these counts, and one with few samples at a time for equal time. */
+const WAYS = [
+  { name: "environment", counts: "100", strategy: "environment:100", few: "environment:4" },
+  { name: "reflectance", counts: "75", strategy: "brdf:75", few: "brdf:4" },
+  { name: "both", counts: "50 : 38", strategy: "mis:50:38", few: "mis:2:2" },
+  { name: "resampling", counts: "15/800", strategy: "sir:15/800", few: "sir:1/53" },
+];
+/** The settings of the reference pictures, of which there are two. */
+const TRUTH = { strategy: "product:16", spp: 32 };
+/** The engine's time for each way at equal time [ms]. */
+const EQUAL_TIME = 250;
+/** The edge of the pictures [pixels]. */
+const SIZE = 96;
+
+interface Rendered {
+  film: Film;
+  rays: number;
+  /** The time in the engine [ms], which is CPU time where the Worker has a core for itself. */
+  time: number;
+}
+
+/** One repeat of one way. */
+interface Run extends Rendered {
+  error: number;
+}
+
+/** The mean relative squared error of a picture against two independent references, without their variance. */
+function errorOf({ film }: Rendered, [a, b]: Rendered[]): number {
+  let sum = 0;
+  for (let i = 0; i < film.pixels.length; i += 4) {
+    const [x, y, z] = [film, a.film, b.film].map((of) => luminance(of.pixels, i)), truth = (y + z) / 2;
+    sum += (x - y) * (x - z) / (truth * truth + 0.01);
+  }
+  return sum / (film.pixels.length / 4);
+}
+
+/** The mean of the runs' values, and its standard error, which takes two runs. */
+function mean(runs: Run[], of: (run: Run) => number): [number, number] {
+  const m = runs.reduce((sum, run) => sum + of(run), 0) / runs.length;
+  const squares = runs.reduce((sum, run) => sum + (of(run) - m) ** 2, 0);
+  return [m, runs.length > 1 ? Math.sqrt(squares / (runs.length - 1) / runs.length) : NaN];
+}
+
+const withError = ([m, sd]: [number, number], digits = 2) => `${short(Number(m.toPrecision(digits)))}${isFinite(sd) ? ` ± ${short(Number(sd.toPrecision(1)))}` : ""}`;
+
+export const fourWays = (stage: Stage) => {
+  const by = stage.choice("Compare", [["counts", "at the counts above"], ["time", "at equal time"]]);
+  const diffuse = stage.slider("Diffuse share", 0, 0.8, 0.1, 0);
+  const repeats = stage.player("Repeats", 1, 12, 3, String);
+  const figures = WAYS.map(({ name, counts }) => {
+    const canvas = h("canvas", { width: String(SIZE), height: String(SIZE), role: "img", "aria-label": `A sphere rendered by ${name}`, "data-frame": JSON.stringify(pixels(SIZE, SIZE)) });
+    const caption = h("figcaption", {}, `${name}, ${counts}`);
+    return { view: new FilmView(canvas, false), caption, figure: h("figure", {}, canvas, caption) };
+  });
+  stage.drawing.replaceChildren(h("div", { class: "quartet" }, ...figures.map((f) => f.figure)));
+  const pointed = stage.pointer(() => {});
+  const host = stage.app.engines.extra(), truths = new Map<number, Rendered[]>(), known = new Map<string, Run[]>();
+  let token = 0;
+  /** Renders a picture, stopped after so much of the engine's time if it is timed. */
+  const render = (strategy: string, spp: number, milliseconds = Infinity) => new Promise<Rendered>((resolve, reject) => {
+    const film = new Film(SIZE, SIZE), mine = ++token;
+    let time = 0;
+    host.onRender = (message) => {
+      if (message.token !== mine) return;
+      if (message.kind === "failed") reject(new Error(message.error));
+      if (message.kind !== "update") return;
+      film.put(message.windows, message.pixels);
+      time += message.milliseconds;
+      // Every pixel has at least one sample.
+      if (message.complete || (time >= milliseconds && message.statistics.samples >= 1)) {
+        host.send({ kind: "stop" });
+        resolve({ film, rays: message.statistics.shadowRays, time });
+      }
+    };
+    host.send({ kind: "render", token: mine, settings: JSON.stringify({ width: SIZE, height: SIZE, spp, strategy, seed: mine, hideEnvironment: true, camera: null, shard: [0, 1] }) });
+  });
+  let loaded = NaN;
+  const load = async (share: number) => {
+    if (loaded === share) return;
+    loaded = share;
+    await host.call("loadScene", JSON.stringify({ scene: "sphere-orthographic", material: `phong:50:1:${share}`, ground: false }));
+    await host.call("loadEnvironment", JSON.stringify({ probe: "cathedral", rows: 128, rotate: 0, scale: 1, exposure: 0 }));
+  };
+  stage.draw(async () => {
+    const share = diffuse(), timed = by() === "time", n = repeats();
+    await load(share);
+    if (!truths.has(share)) truths.set(share, [await render(TRUTH.strategy, TRUTH.spp), await render(TRUTH.strategy, TRUTH.spp)]);
+    const truth = truths.get(share)!, runsOf = ({ name }: { name: string }) => known.get(`${share} ${timed} ${name}`) ?? [];
+    const isStill = () => share === diffuse() && timed === (by() === "time");
+    // All ways have as many repeats at any time, so that Play compares like with like.
+    for (let k = 1; k <= n && isStill(); k++) {
+      for (const way of WAYS) {
+        const runs = runsOf(way);
+        if (runs.length >= k || !isStill()) continue;
+        const picture = await (timed ? render(way.few, 4096, EQUAL_TIME) : render(way.strategy, 1));
+        known.set(`${share} ${timed} ${way.name}`, [...runs, { ...picture, error: errorOf(picture, truth) }]);
+      }
+    }
+    if (!isStill()) return;
+    const all = WAYS.map((way) => runsOf(way).slice(0, n));
+    WAYS.forEach(({ name, counts }, i) => {
+      const { view, caption } = figures[i], runs = all[i];
+      view.set({ exposure: 0, curve: "agx" });
+      view.show(0, runs.at(-1)!.film);
+      caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${withError(mean(runs, (run) => run.error))}`, h("br"), `${withError(mean(runs, (run) => run.time / 1000))} s`);
+    });
+    const rays = WAYS.map(({ name }, i) => `${name} ${short(Number((mean(all[i], (run) => run.rays)[0] / 1000).toPrecision(3)))} thousand`);
+    stage.say(`Errors are mean relative squared errors of the pixels, times the engine’s own: means of ${n} repeat${n > 1 ? "s with their standard errors" : ", too few for a standard error"}. Shadow rays: ${rays.join(", ")}.`);
+    const over = pointed(), at = over && 4 * (Math.min(Math.floor(SIZE - over.y), SIZE - 1) * SIZE + Math.min(Math.floor(over.x), SIZE - 1));
+    if (over && at !== null) {
+      const [seen, y] = [luminance(all[over.frame].at(-1)!.film.pixels, at), luminance(truth[0].film.pixels, at)];
+      stage.read(`Under the pointer, ${WAYS[over.frame].name} has ${short(Number(seen.toPrecision(3)))}, the reference ${short(Number(y.toPrecision(3)))}.`);
+    } else stage.read(null);
+    stage.answer(`${answerOf(all, timed)} Diffuse reflectance hurts reflectance sampling most, because its rays then go everywhere.`);
+  });
+};
+
+/** Which way the figure shows to be best, and whether the repeats suffice to say so. */
+function answerOf(all: Run[][], timed: boolean): string {
+  const errors = all.map((runs, i) => ({ name: WAYS[i].name, error: mean(runs, (run) => run.error), rays: mean(runs, (run) => run.rays)[0] }));
+  const ranked = (of: (e: (typeof errors)[number]) => number) => [...errors].sort((a, b) => of(a) - of(b));
+  const compare = (where: string, of: (e: (typeof errors)[number]) => number) => {
+    const [best, next] = ranked(of), factor = of(next) / of(best);
+    // Two standard errors of the quotient.
+    const uncertainty = 2 * factor * Math.hypot(best.error[1] / best.error[0], next.error[1] / next.error[0]);
+    if (!isFinite(uncertainty)) return `${where}, ${best.name} has the least error; one repeat does not show how certain that is.`;
+    return factor - 1 > uncertainty ? `${where}, ${best.name} has the least error, ${short(Number(factor.toPrecision(2)))} times less than ${next.name} (± ${short(Number(uncertainty.toPrecision(1)))}).`
+      : `${where}, ${best.name} and ${next.name} cannot be told apart with ${all[0].length} repeats.`;
+  };
+  return timed ? `${compare("At equal time", (e) => e.error[0])} The comparison at the counts shows what each ray is worth.`
+    : `${compare("For each ray, that is by error times rays", (e) => e.error[0] * e.rays)} Compare at equal time, too: candidates cost time, but no rays.`;
+}
