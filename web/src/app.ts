@@ -79,8 +79,11 @@ export class App {
     return state;
   }
 
-  /** Shows which parts of a link are not understood. */
+  /** The parts of the link that are not understood. */
+  private wrong: string[] = [];
+
   private tellWrong(parts: string[]) {
+    this.wrong = parts;
     const notice = $("wrong");
     notice.hidden = !parts.length;
     const shortened = parts.map((part) => (part.length > 60 ? `${part.slice(0, 57)}…` : part));
@@ -88,10 +91,10 @@ export class App {
   }
 
   /** Replaces a part of the state that the engine refuses by its default. */
-  replace(key: "strategy" | "beside", error: string) {
-    this.tellWrong([`${key}=${this.state[key]} (${error})`]);
+  replace(key: "strategy" | "beside") {
+    const wrong = [...this.wrong, `${key}=${this.state[key]}`];
     this.set({ [key]: DEFAULT[key] });
-    $("wrong").hidden = false;
+    this.tellWrong(wrong);
   }
 
   on(listener: (what: Change) => void) {

@@ -71,7 +71,7 @@ function ofMeasured(points: Measured[]): string {
   const [error, sd] = jackknife((without) => Math.sqrt(Math.max(last.parts.mean(without), 0)));
   const whole = points.filter(({ isWhole }) => isWhole);
   const [k, ofSlope] = jackknife((without) => slope(whole.map(({ rays, parts }) => [rays, Math.sqrt(Math.max(parts.mean(without), 0))])));
-  const fall = isFinite(k) && isFinite(ofSlope) ? `slope ${signed(k)} ± ${ofSlope.toFixed(2)}` : "a slope needs two passes";
+  const fall = isFinite(k) && isFinite(ofSlope) ? `slope ${signed(k)} ± ${short(Number(ofSlope.toPrecision(1)))}` : "a slope needs two passes";
   return `has ${short(error)} ± ${short(Number(sd.toPrecision(2)))}, ${fall}`;
 }
 

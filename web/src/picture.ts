@@ -96,11 +96,12 @@ export class PicturePanel {
 
   /** A link with a bad strategy shows the usual one. */
   private failed(job: Job, error: string) {
-    this.app.tell(error, true);
+    // The message of the parser has a place in the settings, which nobody wrote.
+    this.app.tell(error.replace(/^settings: /, "").replace(/ at line \d+ column \d+$/, ""), true);
     const side = this.jobs.indexOf(job);
     if (side < 0 || this.preview || this.times.done) return;
     const key = side ? "beside" : "strategy";
-    if (this.app.state[key] !== DEFAULT[key]) this.app.replace(key, error);
+    if (this.app.state[key] !== DEFAULT[key]) this.app.replace(key);
   }
 
   /** Restarts the render. After a change of the view, first renders a small preview for an immediate response. */

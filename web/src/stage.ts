@@ -52,7 +52,7 @@ export class Stage {
 
   /** Adds playback that moves a slider by `by` at each step. */
   play({ input }: Slider, by: number) {
-    this.controls.append(player(input, by, () => !this.isDrawing));
+    input.closest("label")!.after(player(input, by, () => !this.isDrawing));
   }
 
   /** Reads the pointer over the figure's plots and maps; `drag` is called while it drags. */

@@ -187,7 +187,7 @@ export const STEPS: Step[] = [
       "Then a small sun or lamp stays in one region, and the lights go where the energy is spread out: to the rest of the map.",
     ],
     formulas: [row(`<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
-    question: "With 64 lights, which method has the smaller shading error, and by how much?",
+    question: "Which method has the smaller shading error with equally many lights, and by how much?",
     answer: "Variance minimization, as the numbers under the picture show; on a map without small bright lights the difference is smaller.",
   },
 ];

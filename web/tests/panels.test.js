@@ -122,7 +122,7 @@ test("errors are measured at whole passes against a reference that is made by it
   const last = first.points.at(-1)[1];
   assert.ok(last > 0.5 * first.variance && last < 2 * first.variance, `measured ${last}, estimated ${first.variance}`);
   const caption = await text(page, "#picture figcaption");
-  assert.match(caption, /measured against a reference of \d+ independent renders .*: mis:1:1 has [\d.]+ ± [\d.]+, slope −0\.[3-9]\d ± 0\.\d\d/);
+  assert.match(caption, /measured against a reference of \d+ independent renders .*: mis:1:1 has [\d.]+ ± [\d.]+, slope −0\.[3-9]\d ± 0\.\d+/);
   assert.equal((await page.$$("#error-plot circle.first")).length, 5);
   // The same link has the same numbers, and another strategy the same reference.
   await renderedAnew(page, () => page.evaluate(() => window.domelight.app.set({ strategy: "brdf:2" })));
@@ -446,6 +446,7 @@ const drawn = (page, n) => page.waitForFunction((n) => Number(document.getElemen
 
 test("every step of the lecture has a figure that each of its controls changes", async () => {
   const { page, done } = await open(`${SMALL}&panel=lecture`);
+  page.setDefaultTimeout(180_000);
   const steps = await page.$$eval("#steps a", (all) => all.length);
   assert.equal(steps, 15);
   for (let step = 1; step <= steps; step++) {
@@ -529,11 +530,10 @@ const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[
 
 for (let step = 1; step <= 15; step++) {
   test(`the figure of step ${step} plays, pauses, is dragged and read`, async () => {
-    const { page, done } = await open(`${SMALL}&panel=lecture&step=${step}`);
+    // One repeat of the four ways at equal time takes least.
+    const { page, done } = await open(`${SMALL}&panel=lecture&step=${step}${step === 12 ? "&figure=time;0;1" : ""}`);
     await page.waitForSelector(`html[data-step='${step}']`);
     await drawn(page, 1);
-    const times = () => page.$eval("#figure", (figure) => Number(figure.dataset.drawn));
-    const button = (name) => page.locator(`#figure .player button:text-is("${name}")`).first();
     // From its last step, a figure would start over.
     await page.$eval("#figure .player", (player) => {
       const input = player.previousElementSibling.querySelector("input");
@@ -541,15 +541,23 @@ for (let step = 1; step <= 15; step++) {
       input.dispatchEvent(new Event("input", { bubbles: true }));
     });
     await page.waitForTimeout(300);
-    const before = await figureOf(page), n = await times();
-    await button("Play").click();
-    await drawn(page, n + 2);
-    await button("Pause").click();
-    await page.waitForTimeout(400);
-    const paused = await figureOf(page);
-    assert.notEqual(paused, before, "it plays");
-    await page.waitForTimeout(400);
-    assert.equal(await figureOf(page), paused, "a paused figure stands still");
+    const before = await figureOf(page);
+    // A busy machine may draw so slowly that playback ends before another click.
+    const wasPlaying = await page.evaluate(async () => {
+      const figure = document.getElementById("figure"), toggle = figure.querySelector(".player button:nth-child(2)");
+      const times = () => Number(figure.dataset.drawn), n = times();
+      toggle.click();
+      const isPlaying = toggle.textContent === "Pause";
+      while (times() < n + 2) await new Promise((done) => setTimeout(done, 5));
+      if (toggle.textContent === "Pause") toggle.click();
+      return isPlaying;
+    });
+    assert.ok(wasPlaying);
+    const position = () => page.$eval("#figure .player", (player) => player.previousElementSibling.querySelector("input").value);
+    const paused = await position();
+    await page.waitForTimeout(500);
+    assert.equal(await position(), paused, "a paused figure stands still");
+    assert.notEqual(await figureOf(page), before, "it plays");
     const framed = page.locator("#figure [data-frame]").first();
     await framed.scrollIntoViewIfNeeded();
     const box = await framed.boundingBox(), at = ([x, y]) => [box.x + x * box.width, box.y + y * box.height];
@@ -576,7 +584,8 @@ for (let step = 1; step <= 15; step++) {
 }
 
 test("the answer of step 12 is what its figure shows, with the repeats' standard errors", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture&step=12&figure=counts;0;3`);
+  const { page, done } = await open(`${SMALL}&panel=lecture&step=12&figure=counts;0;2`);
+  page.setDefaultTimeout(180_000);
   await drawn(page, 1);
   const captions = await page.$$eval("#figure figcaption", (all) => all.map((caption) => caption.textContent));
   for (const caption of captions) assert.match(caption, /error [\d.·⁻⁰-⁹10]+ ± .* s$/);
@@ -727,6 +736,7 @@ test("sliders say their values as they are written", async () => {
 
 test("all steps are printed, with and without answers", async () => {
   const { page, done } = await open(`${SMALL}&panel=lecture`, { script: "window.print = () => { window.printed = true; };" });
+  page.setDefaultTimeout(180_000);
   for (const answers of [true, false]) {
     await page.setChecked("#with-answers", answers);
     await page.click("#print-all");
@@ -878,8 +888,7 @@ test("a hash of nonsense is the default picture", async () => {
 test("a wrong link shows the defaults and says what is wrong", async () => {
   const { page, done } = await open(`${SMALL}&curve=nope&what=1&pixel=[1]&strategy=velvet:3`);
   await rendered(page);
-  assert.match(await text(page, "#wrong"), /curve=nope|strategy=velvet/);
-  await page.waitForFunction(() => /strategy=velvet:3/.test(document.getElementById("wrong").textContent));
+  await page.waitForFunction(() => /curve=nope, what=1, pixel=\[1\], strategy=velvet:3\./.test(document.getElementById("wrong").textContent));
   assert.equal(await page.evaluate(() => window.domelight.app.state.strategy), "product:8");
   await page.evaluate(() => { location.hash = "size=64&spp=1&rows=64&panel=nowhere&step=99"; });
   await page.waitForFunction(() => /panel=nowhere, step=99/.test(document.getElementById("wrong").textContent));

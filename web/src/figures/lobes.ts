@@ -68,7 +68,7 @@ export const lobes = (stage: Stage) => {
       const t = polarAngle(at), i = Math.min(Math.max(Math.floor((t / 180 + 0.5) * n), 0), n - 1);
       stage.read(`${Math.round(Math.abs(t))}° from the normal on the ${t < 0 ? "viewer’s" : "mirror’s"} side: Phong ${short(series[0].points[i][1])}, cosine ${short(series[1].points[i][1])} per steradian.`);
     } else stage.read(at && readDirection(at, view));
-    stage.say(`The maximum density is ${short(peak)} per steradian; ${short(100 * (1 - kept / 2000))} % of the Phong samples are below the surface. ${samples.length / 3} of ${count} samples are above it, seen from above.`);
+    stage.say(`The maximum density is ${short(peak)} per steradian; ${short(100 * (1 - kept / 2000))} % of the Phong samples are below the surface. ${samples.length / 3} of ${count} samples are above it; the lower picture shows them from above.`);
   });
 };
 

@@ -13,7 +13,7 @@ const WAYS = [
   { name: "resampling", counts: "15/800", strategy: "sir:15/800", few: "sir:1/53" },
 ];
 /** The settings of the reference pictures, of which there are two. */
-const TRUTH = { strategy: "product:16", spp: 32 };
+const TRUTH = { strategy: "product:16", spp: 16 };
 /** The engine's time for each way at equal time [ms]. */
 const EQUAL_TIME = 250;
 /** The edge of the pictures [pixels]. */
@@ -88,23 +88,9 @@ export const fourWays = (stage: Stage) => {
     await host.call("loadScene", JSON.stringify({ scene: "sphere-orthographic", material: `phong:50:1:${share}`, ground: false }));
     await host.call("loadEnvironment", JSON.stringify({ probe: "cathedral", rows: 128, rotate: 0, scale: 1, exposure: 0 }));
   };
-  stage.draw(async () => {
-    const share = diffuse(), timed = by() === "time", n = repeats();
-    await load(share);
-    if (!truths.has(share)) truths.set(share, [await render(TRUTH.strategy, TRUTH.spp), await render(TRUTH.strategy, TRUTH.spp)]);
-    const truth = truths.get(share)!, runsOf = ({ name }: { name: string }) => known.get(`${share} ${timed} ${name}`) ?? [];
-    const isStill = () => share === diffuse() && timed === (by() === "time");
-    // All ways have as many repeats at any time, so that Play compares like with like.
-    for (let k = 1; k <= n && isStill(); k++) {
-      for (const way of WAYS) {
-        const runs = runsOf(way);
-        if (runs.length >= k || !isStill()) continue;
-        const picture = await (timed ? render(way.few, 4096, EQUAL_TIME) : render(way.strategy, 1));
-        known.set(`${share} ${timed} ${way.name}`, [...runs, { ...picture, error: errorOf(picture, truth) }]);
-      }
-    }
-    if (!isStill()) return;
-    const all = WAYS.map((way) => runsOf(way).slice(0, n));
+  /** Shows the repeats that there are of those that are wanted. */
+  const show = (all: Run[][], timed: boolean, wanted: number) => {
+    const n = all[0].length;
     WAYS.forEach(({ name, counts }, i) => {
       const { view, caption } = figures[i], runs = all[i];
       view.set({ exposure: 0, curve: "agx" });
@@ -112,13 +98,32 @@ export const fourWays = (stage: Stage) => {
       caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${withError(mean(runs, (run) => run.error))}`, h("br"), `${withError(mean(runs, (run) => run.time / 1000))} s`);
     });
     const rays = WAYS.map(({ name }, i) => `${name} ${short(Number((mean(all[i], (run) => run.rays)[0] / 1000).toPrecision(3)))} thousand`);
-    stage.say(`Errors are mean relative squared errors of the pixels, times the engine’s own: means of ${n} repeat${n > 1 ? "s with their standard errors" : ", too few for a standard error"}. Shadow rays: ${rays.join(", ")}.`);
-    const over = pointed(), at = over && 4 * (Math.min(Math.floor(SIZE - over.y), SIZE - 1) * SIZE + Math.min(Math.floor(over.x), SIZE - 1));
+    stage.say(`Errors are mean relative squared errors of the pixels, times the engine’s own: means of ${n === wanted ? n : `${n} of ${wanted}`} repeat${n > 1 ? "s with their standard errors" : ", too few for a standard error"}. Shadow rays: ${rays.join(", ")}.`);
+    stage.answer(`${answerOf(all, timed)} Diffuse reflectance hurts reflectance sampling most, because its rays then go everywhere.`);
+  };
+  stage.draw(async () => {
+    const share = diffuse(), timed = by() === "time", n = repeats();
+    await load(share);
+    if (!truths.has(share)) truths.set(share, [await render(TRUTH.strategy, TRUTH.spp), await render(TRUTH.strategy, TRUTH.spp)]);
+    const truth = truths.get(share)!, runsOf = ({ name }: { name: string }) => known.get(`${share} ${timed} ${name}`) ?? [];
+    const isStill = () => share === diffuse() && timed === (by() === "time");
+    // All ways have as many repeats at any time, so that the figure compares like with like.
+    for (let k = 1; k <= n && isStill(); k++) {
+      for (const way of WAYS) {
+        const runs = runsOf(way);
+        if (runs.length >= k || !isStill()) continue;
+        const picture = await (timed ? render(way.few, 4096, EQUAL_TIME) : render(way.strategy, 1));
+        known.set(`${share} ${timed} ${way.name}`, [...runs, { ...picture, error: errorOf(picture, truth) }]);
+      }
+      if (isStill()) show(WAYS.map((way) => runsOf(way).slice(0, k)), timed, n);
+    }
+    if (!isStill()) return;
+    const all = WAYS.map((way) => runsOf(way).slice(0, n)), over = pointed();
+    const at = over && 4 * (Math.min(Math.floor(SIZE - over.y), SIZE - 1) * SIZE + Math.min(Math.floor(over.x), SIZE - 1));
     if (over && at !== null) {
       const [seen, y] = [luminance(all[over.frame].at(-1)!.film.pixels, at), luminance(truth[0].film.pixels, at)];
       stage.read(`Under the pointer, ${WAYS[over.frame].name} has ${short(Number(seen.toPrecision(3)))}, the reference ${short(Number(y.toPrecision(3)))}.`);
     } else stage.read(null);
-    stage.answer(`${answerOf(all, timed)} Diffuse reflectance hurts reflectance sampling most, because its rays then go everywhere.`);
   });
 };
 
