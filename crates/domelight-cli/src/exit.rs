@@ -20,6 +20,7 @@ use domelight::picture::compare::SizeMismatch;
 use domelight::quote::terminal;
 use domelight::render::CheckpointError;
 use domelight::rig::ibl::IblError;
+use domelight::rig::tables::TablesError;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{CameraError, LoadError, SceneError};
 use domelight::strategy::PrepareError;
@@ -83,6 +84,7 @@ fn code(error: &anyhow::Error) -> u8 {
             || cause.is::<EnvironmentError>()
             || cause.is::<CheckpointError>()
             || cause.is::<IblError>()
+            || cause.is::<TablesError>()
             || cause.is::<FileConflict>()
     };
     let is_permanent = error.is::<UsageError>()

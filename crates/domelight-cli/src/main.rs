@@ -38,6 +38,7 @@ mod scene;
 mod shell;
 mod strategy;
 mod suggest;
+mod tables;
 mod terminal;
 mod tone;
 mod turntable;
@@ -62,6 +63,7 @@ fn main() -> ExitCode {
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Ibl(arguments) => ibl::run(&arguments, quiet),
+        Command::Tables(arguments) => tables::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
         Command::Conventions(arguments) => conventions::run(&arguments),
         Command::Schema => output::print_json(&domelight_lab::job::schema()),

@@ -37,6 +37,9 @@ pub(crate) const IBL_TEXEL: u64 = 64;
 /// The hierarchy over the texels of a map that is prefiltered, at the most.
 pub(crate) const IBL_HIERARCHY: u64 = 128 << 20;
 
+/// For each texel of tables for shaders: the averaged map and its table, the groups, the texture and its bytes, a picture of it.
+pub(crate) const TABLES_TEXEL: u64 = 160;
+
 /// For each texel of a map that is computed or converted.
 pub(crate) const MAP_TEXEL: u64 = 24;
 

@@ -6,7 +6,7 @@ use std::fs;
 use tempfile::TempDir;
 
 /// Small runs of every command, in an order in which each finds the files of those before.
-const RUNS: [(&str, &[&str]); 15] = [
+const RUNS: [(&str, &[&str]); 16] = [
     (
         "render",
         &[
@@ -74,6 +74,7 @@ const RUNS: [(&str, &[&str]); 15] = [
     ),
     ("lights", &["sky", "--env-rows", "32", "--sun", "-o", "sun.py"]),
     ("ibl", &["sky", "--env-rows", "16", "--size", "4", "-o", "cube.ktx2"]),
+    ("tables", &["sky", "--env-rows", "16", "-o", "sky.bin"]),
     ("probe", &["sky", "--size", "32"]),
     ("figures", &["--quick", "--env-rows", "24", "--scene", "sphere", "--only", "1"]),
     ("conventions", &[]),

@@ -18,6 +18,7 @@ mod limits;
 mod names;
 mod render;
 mod rig_formats;
+mod tables;
 mod terminal;
 mod tone;
 

@@ -26,6 +26,7 @@ mod rig;
 mod rig_export;
 mod scene_bytes;
 mod scene_loaders;
+mod shader_tables;
 mod tables;
 mod textures;
 mod tone;

@@ -9,6 +9,7 @@ pub(crate) mod inspect;
 pub(crate) mod lights;
 pub(crate) mod render;
 pub(crate) mod render_run;
+pub(crate) mod tables;
 pub(crate) mod turntable;
 
 use crate::memory::MaxMemory;
@@ -115,6 +116,9 @@ pub(crate) enum Command {
     /// Prefilter a light probe for an engine: cube maps in KTX2 and DDS, spherical harmonics, BRDF table.
     #[command(after_help = ibl::EXAMPLES, mut_arg("light.map", lights::positional))]
     Ibl(Box<ibl::IblArguments>),
+    /// Write a light probe as tables that shaders sample, with their code: WGSL, GLSL, HLSL, Slang, CUDA, Metal.
+    #[command(after_help = tables::EXAMPLES, mut_arg("light.map", lights::positional))]
+    Tables(Box<tables::TablesArguments>),
     /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
     #[command(after_help = DIFF_EXAMPLES)]
     Diff(DiffArguments),

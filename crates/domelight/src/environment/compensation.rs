@@ -43,7 +43,13 @@ impl CompensatedTable {
         (le, self.density(le))
     }
 
-    fn density(&self, le: Rgb) -> f32 {
+    /// The table; `None` if nothing exceeds the mean.
+    pub(crate) fn table(&self) -> Option<&HierarchicalTable> {
+        self.table.as_ref()
+    }
+
+    /// The density \[sr⁻¹\] at a texel of this radiance.
+    pub(crate) fn density(&self, le: Rgb) -> f32 {
         (le.luminance() - self.floor).max(0.0) * self.inverse_total
     }
 }

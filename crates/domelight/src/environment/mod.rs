@@ -534,8 +534,13 @@ impl Environment {
     }
 
     /// A texel's probability divided by its solid angle. The solid angle in the weight cancels.
-    fn density(&self, le: Rgb) -> f32 {
+    pub(crate) fn density(&self, le: Rgb) -> f32 {
         le.luminance() * self.inverse_power
+    }
+
+    /// The distance from a texel's edge, in texels, within which a rounded direction may look up a neighbor.
+    pub(crate) fn rounding_margin(&self) -> Vec2 {
+        self.grid.margin
     }
 
     fn texel(&self, wi: Vec3) -> Texel {

@@ -28,6 +28,7 @@ mod regions;
 mod smallest;
 mod spherical_harmonics;
 mod split;
+pub mod tables;
 mod texels;
 mod variance_minimization;
 
