@@ -28,6 +28,7 @@ import usd
 OUT = HERE / "out"
 DOMELIGHT = os.environ["DOMELIGHT"]
 FORMATS = ["json", "csv", "gltf", "glb", "usda", "py", "xml", "pbrt", "js", "rad", "ibl"]
+FORMATS += ["tscn", "unreal.py", "cs", "rs", "babylon.js"]
 # Rigs by name: how `domelight lights` is called, the up axis, the rotation [degrees].
 RIGS = {
     "lamps": (["--lamps", "3"], "y", 40.0),
@@ -288,6 +289,7 @@ def check_web(table, rigs):
     jobs = []
     for rig in rigs.values():
         calls = [("three", "module", "js"), ("three", "gltf", "glb"), ("three", "gltf", "gltf")]
+        calls += [("babylon", "module", "babylon.js"), ("babylon", "rightHanded", "babylon.js")]
         if rig.residual is not None:
             calls += [("three", "dome", "js"), ("three", "rig", "js"), ("babylon", "gltf", "glb")]
         for page, call, extension in calls:
@@ -307,6 +309,8 @@ def check_web(table, rigs):
         ("three", "rig"): f"three.js {versions['three']}, module with its dome",
         ("three", "gltf"): f"three.js {versions['three']}, GLTFLoader",
         ("babylon", "gltf"): f"Babylon.js {versions['babylon']}, glTF",
+        ("babylon", "module"): f"Babylon.js {versions['babylon']}, module",
+        ("babylon", "rightHanded"): f"Babylon.js {versions['babylon']}, module, right-handed",
     }
     for rig, job in jobs:
         page, call, view = job["page"], job["call"], job["view"]
@@ -377,6 +381,33 @@ def check_readers(table, rigs):
         table.check(name, f"{rig.name}: colors, of 8 bits", strength, 0.5 / 255 + 1e-6)
         if rig.residual is not None:
             table.count(name, f"{rig.name}: panorama not found", int(not (rig.folder / file).is_file()))
+
+
+ENGINES = {
+    "Godot 4": ("tscn", readers.godot),
+    "Unreal": ("unreal.py", readers.unreal),
+    "Unity": ("cs", readers.unity),
+    "Bevy": ("rs", readers.bevy),
+}
+
+
+def check_engines(table, rigs):
+    for engine, (extension, reader) in ENGINES.items():
+        name = f"{engine}, a reader, not the program"
+        for rig in rigs.values():
+            lights, file, direction = reader(rig.file(extension))
+            pairs = list(zip(rig.lights, lights, strict=True))
+            off = max(angle(light["direction"], d) for light, (d, _) in pairs)
+            table.check(name, f"{rig.name}: directions", off, 1e-3, 0.01, "{:.5f}°")
+            off = max(abs(light["irradiance"] - e).max() / e.max() for light, (_, e) in pairs)
+            table.check(name, f"{rig.name}: irradiance", off, 1e-5, text="{:.4f} %")
+            if rig.residual is None:
+                continue
+            table.count(name, f"{rig.name}: dome's picture not found", int(not (rig.folder / file).is_file()))
+            u, v, world = rig.texel_directions()
+            y_up = world @ (rig.map_to_y_up @ rig.map_to_world.T).T
+            off = np.linalg.norm(direction(u, v) - y_up, axis=1).max()
+            table.check(name, f"{rig.name}: directions of the dome's texels", np.degrees(off), 1e-3, 0.01, "{:.5f}°")
 
 
 NAMES = [
@@ -454,6 +485,7 @@ def main():
         ("gltf-validator", check_gltf),
         ("three.js, Babylon.js", check_web),
         ("pbrt-v4, sIBL", check_readers),
+        ("Godot, Unreal, Unity, Bevy", check_engines),
         ("names of files", lambda table, _: check_names(table)),
     ]
     for name, check in checks:

@@ -24,7 +24,7 @@ const RULES: Record<string, string> = {
 /** The programs that read the formats. */
 const READERS: Record<string, string> = {
   json: "domelight", csv: "spreadsheets", gltf: "glTF", glb: "glTF", usd: "OpenUSD", blender: "Blender", mitsuba: "Mitsuba", pbrt: "pbrt",
-  three: "three.js", radiance: "Radiance", sibl: "sIBL",
+  three: "three.js", radiance: "Radiance", sibl: "sIBL", godot: "Godot", unreal: "Unreal", unity: "Unity", bevy: "Bevy", babylon: "Babylon.js",
 };
 
 interface Rig {

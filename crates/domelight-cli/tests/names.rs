@@ -53,7 +53,24 @@ fn no_result_names_a_folder_of_the_machine() {
     run(&[&["bench"], &suite[..], &["-o", &at("out/bench.json")]].concat());
 
     // Rigs in another folder than their dome's.
-    let formats = ["json", "csv", "gltf", "glb", "usda", "py", "xml", "pbrt", "js", "rad", "ibl"];
+    let formats = [
+        "json",
+        "csv",
+        "gltf",
+        "glb",
+        "usda",
+        "py",
+        "xml",
+        "pbrt",
+        "js",
+        "rad",
+        "ibl",
+        "tscn",
+        "unreal.py",
+        "cs",
+        "rs",
+        "babylon.js",
+    ];
     for format in formats {
         let rig = at(&format!("rigs/rig.{format}"));
         let dome = at(&format!("out/{format}.exr"));

@@ -5,7 +5,16 @@ use crate::common;
 use common::{domelight, done, load, stderr};
 use tempfile::TempDir;
 
-const RIGS: [&str; 5] = ["rig.xml", "rig.rad", "rig.pbrt", "rig.js", "rig.glb"];
+const RIGS: [&str; 8] = [
+    "rig.xml",
+    "rig.rad",
+    "rig.pbrt",
+    "rig.js",
+    "rig.glb",
+    "rig.tscn",
+    "rig.unreal.py",
+    "rig.babylon.js",
+];
 
 #[test]
 fn each_rig_names_the_picture_that_its_program_reads() {
@@ -17,6 +26,9 @@ fn each_rig_names_the_picture_that_its_program_reads() {
         ("rig.xml", "rig_dome.exr"),
         ("rig.rad", "rig_dome.hdr"),
         ("rig.pbrt", "rig_dome_octahedral.exr"),
+        ("rig.tscn", "rig_dome.exr"),
+        ("rig.unreal.py", "rig_dome.hdr"),
+        ("rig.babylon.js", "rig_dome.hdr"),
     ] {
         let text = std::fs::read_to_string(folder.path().join(rig)).expect(rig);
         assert!(text.contains(&format!("\"{picture}\"")), "{rig}: {text}");

@@ -186,8 +186,9 @@ impl Rig {
     /// path : str or os.PathLike
     ///     The file; if its format refers to a picture of the residual, that is written beside it as `<name>_dome`.
     /// format : str, optional
-    ///     'json', 'csv', 'gltf', 'glb', 'usd', 'blender', 'mitsuba', 'pbrt', 'three', 'radiance' or 'sibl'; by default
-    ///     by the extension (.json, .csv, .gltf, .glb, .usda, .py, .xml, .pbrt, .js, .rad, .ibl).
+    ///     'json', 'csv', 'gltf', 'glb', 'usd', 'blender', 'mitsuba', 'pbrt', 'three', 'radiance', 'sibl', 'godot',
+    ///     'unreal', 'unity', 'bevy' or 'babylon'; by default by the extension (.json, .csv, .gltf, .glb, .usda, .py, .xml,
+    ///     .pbrt, .js, .rad, .ibl, .tscn, .unreal.py, .cs, .rs, .babylon.js).
     ///
     /// Raises
     /// ------
@@ -195,10 +196,10 @@ impl Rig {
     ///     If a file cannot be written, or the format is unknown.
     #[pyo3(signature = (path, *, format = None))]
     fn save(&self, py: Python<'_>, path: PathBuf, format: Option<&str>) -> PyResult<()> {
-        let extension = path.extension().and_then(|e| e.to_str());
+        let file_name = path.file_name().and_then(|name| name.to_str());
         let format = match format {
             Some(name) => name.parse().map_err(|e| from_source(&e))?,
-            None => extension.and_then(Format::of_extension).ok_or_else(|| {
+            None => file_name.and_then(Format::of_file_name).ok_or_else(|| {
                 let known = Format::ALL.map(|f| format!(".{}", f.extensions()[0])).join(", ");
                 bad_value(format!(
                     "{}: its name must end in one of {known}, or give format",

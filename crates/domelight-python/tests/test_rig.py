@@ -43,6 +43,7 @@ def test_a_sun_leaves_a_residual():
 FORMATS = {
     "json": "json", "csv": "csv", "gltf": "gltf", "glb": "glb", "usd": "usda", "blender": "py",
     "mitsuba": "xml", "pbrt": "pbrt", "three": "js", "radiance": "rad", "sibl": "ibl",
+    "godot": "tscn", "unreal": "unreal.py", "unity": "cs", "bevy": "rs", "babylon": "babylon.js",
 }  # fmt: skip
 
 

@@ -144,7 +144,8 @@ impl FromStr for RigPath {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let path = PathBuf::from(text);
-        let format = path.extension().and_then(|e| Format::of_extension(&e.to_string_lossy()));
+        let format =
+            path.file_name().and_then(|name| Format::of_file_name(&name.to_string_lossy()));
         Ok(Self { path, format })
     }
 }

@@ -36,11 +36,14 @@
 //! let script = code!(Shell, "cd {folder}\n");
 //! ```
 
+pub mod csharp;
+pub mod godot;
 pub mod html;
 pub mod javascript;
 pub mod pbrt;
 pub mod python;
 pub mod radiance;
+pub mod rust;
 pub mod shell;
 pub mod sibl;
 pub mod terminal;
@@ -51,6 +54,14 @@ pub mod yaml;
 use std::fmt::{self, Debug, Display, Write as _};
 use std::marker::PhantomData;
 use std::ops::{Add, AddAssign};
+
+/// C# code.
+#[derive(Clone, Copy, Debug)]
+pub enum CSharp {}
+
+/// A scene of Godot 4.
+#[derive(Clone, Copy, Debug)]
+pub enum Godot {}
 
 /// HTML text, also within attributes in double quotes.
 #[derive(Clone, Copy, Debug)]
@@ -71,6 +82,10 @@ pub enum Python {}
 /// A scene of Radiance.
 #[derive(Clone, Copy, Debug)]
 pub enum Radiance {}
+
+/// Rust code.
+#[derive(Clone, Copy, Debug)]
+pub enum Rust {}
 
 /// A script for a POSIX shell.
 #[derive(Clone, Copy, Debug)]

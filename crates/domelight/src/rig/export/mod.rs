@@ -4,18 +4,24 @@
 //! passed as text.
 
 mod axes;
+mod babylon;
+mod bevy;
 mod blender;
 mod csv;
 mod disc;
 mod gltf;
+mod godot;
 mod json;
 mod mitsuba;
 mod pbrt;
+mod photometric;
 mod program;
 mod radiance;
 mod sibl;
 mod text;
 mod three;
+mod unity;
+mod unreal;
 mod usd;
 
 pub use json::VERSION as JSON_VERSION;
@@ -97,6 +103,16 @@ pub enum Format {
     Radiance,
     /// A smart IBL set.
     Sibl,
+    /// A scene of Godot 4.
+    Godot,
+    /// A Python script for the editor of Unreal Engine 5.
+    Unreal,
+    /// A C# script for the editor of Unity.
+    Unity,
+    /// A Rust module for Bevy.
+    Bevy,
+    /// A Babylon.js module.
+    Babylon,
 }
 
 /// The kind of dome picture that accompanies a rig's file.
@@ -156,7 +172,7 @@ pub struct UnknownFormat {
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 16] = [
         Self::Json,
         Self::Csv,
         Self::Gltf,
@@ -168,6 +184,11 @@ impl Format {
         Self::Three,
         Self::Radiance,
         Self::Sibl,
+        Self::Godot,
+        Self::Unreal,
+        Self::Unity,
+        Self::Bevy,
+        Self::Babylon,
     ];
 
     /// The name on the command line.
@@ -184,10 +205,15 @@ impl Format {
             Self::Three => "three",
             Self::Radiance => "radiance",
             Self::Sibl => "sibl",
+            Self::Godot => "godot",
+            Self::Unreal => "unreal",
+            Self::Unity => "unity",
+            Self::Bevy => "bevy",
+            Self::Babylon => "babylon",
         }
     }
 
-    /// The file extensions of the format, in lower case.
+    /// The file extensions of the format, in lower case; `unreal.py` is one.
     pub fn extensions(self) -> &'static [&'static str] {
         match self {
             Self::Json => &["json"],
@@ -201,13 +227,24 @@ impl Format {
             Self::Three => &["js", "mjs"],
             Self::Radiance => &["rad"],
             Self::Sibl => &["ibl"],
+            Self::Godot => &["tscn"],
+            Self::Unreal => &["unreal.py"],
+            Self::Unity => &["cs"],
+            Self::Bevy => &["rs"],
+            Self::Babylon => &["babylon.js", "babylon.mjs"],
         }
     }
 
-    /// The format of a file extension, case-insensitive.
-    pub fn of_extension(extension: &str) -> Option<Self> {
-        let extension = extension.to_ascii_lowercase();
-        Self::ALL.into_iter().find(|f| f.extensions().contains(&extension.as_str()))
+    /// The format of the longest known extension of a file's name, case-insensitive: `rig.unreal.py` is for Unreal, and
+    /// `rig.py` for Blender.
+    pub fn of_file_name(name: &str) -> Option<Self> {
+        let name = name.to_ascii_lowercase();
+        let has =
+            |extension: &str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
+        let longest = |format: &Self| {
+            format.extensions().iter().filter(|e| has(e)).map(|e| e.len()).max().unwrap_or(0)
+        };
+        Self::ALL.into_iter().max_by_key(longest).filter(|format| longest(format) > 0)
     }
 
     /// The dome picture that files of this format refer to and light a scene with. It must be written
@@ -215,10 +252,12 @@ impl Format {
     pub fn dome_picture(self) -> Option<DomePicture> {
         match self {
             Self::Json | Self::Csv | Self::Gltf | Self::Glb | Self::Three => None,
-            Self::Mitsuba | Self::Sibl => Some(DomePicture::LatLong),
-            Self::Usd | Self::Blender => Some(DomePicture::LatLongExrOrHdr),
+            Self::Mitsuba | Self::Sibl | Self::Bevy => Some(DomePicture::LatLong),
+            Self::Usd | Self::Blender | Self::Godot | Self::Unity => {
+                Some(DomePicture::LatLongExrOrHdr)
+            }
             Self::Pbrt => Some(DomePicture::Octahedral),
-            Self::Radiance => Some(DomePicture::LatLongHdr),
+            Self::Radiance | Self::Unreal | Self::Babylon => Some(DomePicture::LatLongHdr),
         }
     }
 
@@ -241,6 +280,11 @@ impl Format {
             Self::Three => three::encode(rig).into_string().into_bytes(),
             Self::Radiance => radiance::encode(rig)?.into_string().into_bytes(),
             Self::Sibl => sibl::encode(rig)?.into_string().into_bytes(),
+            Self::Godot => godot::encode(rig)?.into_string().into_bytes(),
+            Self::Unreal => unreal::encode(rig).into_string().into_bytes(),
+            Self::Unity => unity::encode(rig).into_string().into_bytes(),
+            Self::Bevy => bevy::encode(rig).into_string().into_bytes(),
+            Self::Babylon => babylon::encode(rig).into_string().into_bytes(),
         })
     }
 
@@ -251,13 +295,18 @@ impl Format {
             Self::Usd => "'\\' and control characters",
             Self::Sibl => "'\"' and control characters",
             Self::Radiance => "control characters and with quotes of one kind at the most",
+            Self::Godot => "'://'",
             Self::Json
             | Self::Csv
             | Self::Gltf
             | Self::Glb
             | Self::Blender
             | Self::Pbrt
-            | Self::Three => "control characters",
+            | Self::Three
+            | Self::Unreal
+            | Self::Unity
+            | Self::Bevy
+            | Self::Babylon => "control characters",
         }
     }
 
@@ -341,10 +390,14 @@ mod tests {
         for format in Format::ALL {
             assert_eq!(format.name().parse(), Ok(format));
             for extension in format.extensions() {
-                assert_eq!(Format::of_extension(&extension.to_uppercase()), Some(format));
+                let name = format!("a.rig.{}", extension.to_uppercase());
+                assert_eq!(Format::of_file_name(&name), Some(format));
             }
         }
-        assert_eq!(Format::of_extension("tiff"), None);
+        for name in ["rig.tiff", "rig", "json", ".", ""] {
+            assert_eq!(Format::of_file_name(name), None, "{name}");
+        }
+        assert_eq!(Format::of_file_name("unreal.py"), Some(Format::Blender));
         let error = "tiff".parse::<Format>().unwrap_err().to_string();
         assert!(error.contains("tiff") && error.contains("json"), "{error}");
     }

@@ -2,7 +2,7 @@
 
 use super::Format;
 use crate::code;
-use crate::quote::{Code, Shell, Xml, javascript, pbrt, shell, xml};
+use crate::quote::{Code, Rust, Shell, Xml, javascript, pbrt, rust, shell, xml};
 
 impl Format {
     /// The names of the programs that read files of this format.
@@ -18,6 +18,11 @@ impl Format {
             Self::Three => "three.js",
             Self::Radiance => "Radiance",
             Self::Sibl => "programs that load sIBL sets",
+            Self::Godot => "Godot 4",
+            Self::Unreal => "Unreal Engine 5",
+            Self::Unity => "Unity",
+            Self::Bevy => "Bevy",
+            Self::Babylon => "Babylon.js",
         }
     }
 
@@ -46,7 +51,7 @@ impl Format {
                 let name = quoted.map_or_else(|| format!("\"{name}\""), Code::into_string);
                 format!("{folder}after WorldBegin Include {name}")
             }
-            Self::Three => {
+            Self::Three | Self::Babylon => {
                 let module = javascript::string(&beside).into_string();
                 format!("import {{ addRig }} from {module}; await addRig(scene)")
             }
@@ -56,6 +61,20 @@ impl Format {
                 format!("{folder}oconv scene.rad {} > scene.oct", argument(name))
             }
             Self::Sibl => "as a set of the program's sIBL loader".to_owned(),
+            Self::Godot => "in a project, with its picture, Scene > Instantiate Child Scene".to_owned(),
+            Self::Unreal => "in the editor Tools > Execute Python Script".to_owned(),
+            Self::Unity => {
+                "into a folder Editor of a project, with its picture, then Tools > Add the rig of domelight"
+                    .to_owned()
+            }
+            Self::Bevy => {
+                let module = code!(
+                    Rust,
+                    "#[path = {file}] mod rig; rig::spawn_rig(&mut commands)",
+                    file = rust::string(file)
+                );
+                module.into_string()
+            }
         }
     }
 }
