@@ -156,8 +156,7 @@ fn pixel_statistics<S: Strategy>(
             PixelPoints::new(i * N_SAMPLES..(i + 1) * N_SAMPLES, N_SAMPLES as u32, sampler)
         };
         let pixels: Vec<PixelPoints> = (0..N_PIXELS).map(pixel).collect();
-        let tile =
-            TileShading { points: &points, samples: &samples, pixels: &pixels, width: TILE_WIDTH };
+        let tile = TileShading::new(&points, &samples, &pixels, TILE_WIDTH);
         let rays = &mut statistics.rays;
         let radiance = estimator.estimate(&numbers, &tile, |asked: &Contributions, visible| {
             *rays += asked.len() as u64;

@@ -47,7 +47,7 @@ pub(crate) fn main() {
         let sampler = Sampler::new(SamplerKind::Sobol, 0, i);
         pixels.push(PixelPoints::new(start..points.len(), 1, sampler));
     }
-    let tile = TileShading { points: &points, samples: &samples, pixels: &pixels, width: 16 };
+    let tile = TileShading::new(&points, &samples, &pixels, 16);
 
     let environment = Environment::builtin(BuiltinProbe::Sky);
     let product = ProductSampling::new(&environment, 16);

@@ -550,6 +550,32 @@ fn cameras_scenes_and_hidden_nodes() {
 }
 
 #[test]
+fn nodes_marked_as_portals_are_rectangles_and_not_shown() {
+    let nodes = |extras: &str| {
+        let more = format!(
+            r#""scenes":[{{"nodes":[0,1]}}],"nodes":[{{"mesh":0}},{{"mesh":0,"translation":[5,0,0],"scale":[2,1,1],"extras":{extras}}}],"#
+        );
+        loaded(&document(&more, "}")).description
+    };
+    let box_of = nodes("7").parts[0].mesh.bounds();
+    for extras in [r#"{"portal":true}"#, r#"{"portal":1,"other":[]}"#] {
+        let description = nodes(extras);
+        assert_eq!((description.parts.len(), description.instances.len()), (1, 0));
+        let [portal] = &description.portals[..] else { panic!("{:?}", description.portals) };
+        let size = box_of.size();
+        let area = 2.0 * size.x * size.y;
+        assert!((portal.area() / area - 1.0).abs() < 1e-5, "{portal:?} {size}");
+        assert!(
+            (portal.corner() - vec3(5.0 + 2.0 * box_of.min.x, box_of.min.y, box_of.min.z)).length()
+                < 1e-5
+        );
+    }
+    for extras in [r#"{"portal":false}"#, r#"{"portal":0}"#, r#""portal""#, "null"] {
+        assert!(nodes(extras).portals.is_empty(), "{extras}");
+    }
+}
+
+#[test]
 fn unusable_cameras_are_left_out_unless_that_is_refused() {
     let cases = [
         (r#""perspective":{"yfov":0}"#, "0°"),

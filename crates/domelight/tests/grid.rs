@@ -196,7 +196,7 @@ fn estimate<S: Strategy>(strategy: &S, at: &ShadingPoint, n: usize, seed: u64) -
                 PixelPoints::new(start..points.len(), count, sampler)
             })
             .collect();
-        let tile = TileShading { points: &points, samples: &samples, pixels: &pixels, width: SIDE };
+        let tile = TileShading::new(&points, &samples, &pixels, SIDE);
         out.reset(points.len());
         strategy.push(&pass, &tile, round, &mut scratch, &mut out);
         let visible: Vec<f32> = out.wi.iter().map(|&wi| visibility(wi)).collect();

@@ -9,12 +9,12 @@ use common::{
 };
 use domelight::bvh::InstructionSet;
 use domelight::environment::{Environment, Orientation, UpAxis};
-use domelight::math::{Frame, Vec3};
+use domelight::math::{Frame, Vec3, vec3};
 use domelight::sampling::{Heuristic, Sampler, SamplerKind};
 use domelight::strategy::levels::{N_LEVELS, level};
 use domelight::strategy::product::ProductScratch;
 use domelight::strategy::{
-    Contributions, LightTable, MultipleImportanceSampling, PixelPoints, ProductSampling,
+    Contributions, LightTable, MultipleImportanceSampling, PixelPoints, Portal, ProductSampling,
     ShadingPoint, Strategy, TileShading,
 };
 use domelight::{Rgb, RgbImage};
@@ -34,8 +34,8 @@ fn estimates(
     strategy: &ProductSampling,
     env: &Environment,
     hits: &[ShadingPoint],
-    sampler: SamplerKind,
-    seed: u64,
+    portals: &[Portal],
+    (sampler, seed): (SamplerKind, u64),
 ) -> [[f64; 3]; KINDS.len()] {
     let n = hits.len();
     let mut scratch = ProductScratch::default();
@@ -63,7 +63,7 @@ fn estimates(
                 })
                 .collect();
             let tile =
-                TileShading { points: &points, samples: &samples, pixels: &pixels, width: SIDE };
+                TileShading { portals, ..TileShading::new(&points, &samples, &pixels, SIDE) };
             out.reset(points.len());
             strategy.push(&shared, &tile, round, &mut scratch, &mut out);
             let visible = |&wi| if hidden(env, wi) { 0.0 } else { 1.0 };
@@ -89,15 +89,61 @@ fn check(
     hits: &[ShadingPoint],
     expected: [f64; 3],
 ) {
+    check_with_portals(test, label, strategy, env, hits, &[], expected);
+}
+
+/// [`check`] with portals.
+fn check_with_portals(
+    test: ZTest,
+    label: &str,
+    strategy: &ProductSampling,
+    env: &Environment,
+    hits: &[ShadingPoint],
+    portals: &[Portal],
+    expected: [f64; 3],
+) {
     let sampler =
         if hits.len().is_multiple_of(2) { SamplerKind::Sobol } else { SamplerKind::Independent };
     let batches: Vec<_> =
-        (0..48).map(|seed| estimates(strategy, env, hits, sampler, seed)).collect();
+        (0..48).map(|seed| estimates(strategy, env, hits, portals, (sampler, seed))).collect();
     for (kind, name) in KINDS.iter().enumerate() {
         let batches: Vec<[f64; 3]> = batches.iter().map(|b| b[kind]).collect();
         let label = format!("{label}, {name}");
         test.against(&label, &batches, expected).unwrap_or_else(|f| panic!("{f}"));
     }
+}
+
+/// A portal above the points, one that leans, and one behind their surface.
+fn portals() -> Vec<Portal> {
+    let portal = |corner, a, b| Portal::new(corner, [a, b]).unwrap();
+    vec![
+        portal(vec3(-0.5, 1.0, -0.5), vec3(1.0, 0.0, 0.0), vec3(0.0, 0.0, 1.0)),
+        portal(vec3(0.5, 0.3, 0.5), vec3(0.2, 0.7, 0.0), vec3(1.0, 0.0, -2.0)),
+        portal(vec3(-1.0, -2.0, -1.0), vec3(2.0, 0.0, 0.0), vec3(0.0, 0.0, 2.0)),
+    ]
+}
+
+/// Portals are hints: where they stand changes noise, never the mean, though light is hidden within them and free beside
+/// them.
+#[test]
+fn portals_are_unbiased_wherever_they_stand() {
+    let env = environment(true, UpAxis::Z);
+    let portals = portals();
+    let sets = [&portals[..1], &portals[1..2], &portals[2..], &portals[..]];
+    let cases = [(0.2, 8, 3), (1.3, 2, 12), (0.7, 1, 2)];
+    let suite = Suite::of(MATERIALS.len() * sets.len() * KINDS.len());
+    let test = ZTest { suite, ..ZTest::default() };
+    MATERIALS.par_iter().enumerate().for_each(|(i, name)| {
+        for (k, portals) in sets.iter().enumerate() {
+            let (theta, n_rays, n_hits) = cases[(i + k) % cases.len()];
+            let at = point(bsdf(name), theta);
+            let expected = quadrature(&env, &at);
+            let strategy = ProductSampling::new(&env, n_rays);
+            let label = format!("{name}, portals {k}, {n_rays} rays, {n_hits} hits");
+            let hits = vec![at; n_hits];
+            check_with_portals(test, &label, &strategy, &env, &hits, portals, expected);
+        }
+    });
 }
 
 /// The numbers that a processor's vectors compute are those of one number at a time.
@@ -109,10 +155,14 @@ fn every_instruction_set_gives_the_same_bits() {
     {
         let hits = [0.2, 0.7, 1.3].map(|theta| point(bsdf(name), theta));
         // In a short pass and in a long one.
-        for (hits, n_rays) in [(hits.to_vec(), 7), (hits.repeat(3), 2)] {
+        let [short, long] = [(hits.to_vec(), 7), (hits.repeat(3), 2)];
+        let portals = portals();
+        for ((hits, n_rays), portals) in
+            [(short.clone(), &[][..]), (long, &[]), (short, &portals[..])]
+        {
             let of = |set| {
                 let strategy = ProductSampling::new(&env, n_rays).with_instruction_set(set)?;
-                Some(estimates(&strategy, &env, &hits, *sampler, 5))
+                Some(estimates(&strategy, &env, &hits, portals, (*sampler, 5)))
             };
             let scalar = of(InstructionSet::Scalar);
             for set in InstructionSet::ALL {
@@ -179,7 +229,7 @@ fn mirror_like_lobes_agree_with_multiple_importance_sampling() {
     let expected = batches(&mis, &env, &at, SamplerKind::Sobol, 1024);
     let strategy = ProductSampling::new(&env, 8);
     let found: Vec<_> = (0..48)
-        .map(|seed| estimates(&strategy, &env, &[at; 4], SamplerKind::Sobol, seed))
+        .map(|seed| estimates(&strategy, &env, &[at; 4], &[], (SamplerKind::Sobol, seed)))
         .collect();
     for (kind, name) in KINDS.iter().enumerate() {
         let found: Vec<[f64; 3]> = found.iter().map(|b| b[kind]).collect();
@@ -219,17 +269,10 @@ fn odd_maps_are_unbiased() {
         let batches: Vec<[f64; 3]> = (0..40)
             .map(|seed| {
                 let sampler = Sampler::new(SamplerKind::Sobol, seed, 0);
-                let tile = TileShading {
-                    points: &[at],
-                    samples: &[0],
-                    pixels: &[PixelPoints {
-                        points: 0..1,
-                        n_samples: 1,
-                        sampler,
-                        one_material: true,
-                    }],
-                    width: 1,
-                };
+                let pixels =
+                    [PixelPoints { points: 0..1, n_samples: 1, sampler, one_material: true }];
+                let points = [at];
+                let tile = TileShading::new(&points, &[0], &pixels, 1);
                 let pass = strategy.begin_pass(Sampler::for_pass(SamplerKind::Sobol, seed, 0), 32);
                 let mut out = Contributions::default();
                 out.reset(1);

@@ -238,7 +238,8 @@ impl<'a> Inspector<'a> {
         resolution: usize,
     ) -> Option<DirectionHistogram> {
         let point = self.representative.as_ref()?;
-        let rays = replicates::rays_of_one_point(point, strategy, &self.settings);
+        let rays =
+            replicates::rays_of_one_point(point, strategy, self.scene.portals(), &self.settings);
         let wi: Vec<Vec3> = rays.iter().map(|&(wi, _)| wi).collect();
         let visibility = self.trace(point, &wi);
         Some(DirectionHistogram::new(point, &rays, &visibility, resolution))
@@ -266,6 +267,7 @@ impl<'a> Inspector<'a> {
             &self.samples,
             strategy,
             &self.settings,
+            self.scene.portals(),
             &self.regions,
             self.environment,
             trace,

@@ -8,7 +8,9 @@ use crate::math::Vec3;
 use crate::render::RenderSettings;
 use crate::sampling::Sampler;
 use crate::sampling::rng::hash2;
-use crate::strategy::{Contributions, Estimator, PixelPoints, ShadingPoint, Strategy, TileShading};
+use crate::strategy::{
+    Contributions, Estimator, PixelPoints, Portal, ShadingPoint, Strategy, TileShading,
+};
 
 /// How often each camera sample is estimated.
 const N_PASSES: usize = 64;
@@ -44,6 +46,7 @@ impl Replicates {
         samples: &[CameraSample],
         strategy: &S,
         settings: &RenderSettings,
+        portals: &[Portal],
         regions: &Regions,
         environment: &Environment,
         trace: impl Fn(&[ShadingPoint], &[u32], &[Vec3], &mut [f32]),
@@ -75,12 +78,8 @@ impl Replicates {
                 PixelPoints::new(range.clone(), SAMPLES_PER_PIXEL as u32, sampler)
             };
             let pixels: Vec<PixelPoints> = ranges.iter().enumerate().map(pixel).collect();
-            let tile = TileShading {
-                points: &points,
-                samples: &numbers,
-                pixels: &pixels,
-                width: TILE_WIDTH,
-            };
+            let tile =
+                TileShading { portals, ..TileShading::new(&points, &numbers, &pixels, TILE_WIDTH) };
             let own = k * points.len() * n_parts..(k + 1) * points.len() * n_parts;
             let seen = &mut replicates.seen[own.clone()];
             let unoccluded = &mut replicates.unoccluded[own];
@@ -154,6 +153,7 @@ fn pixels(samples: &[CameraSample]) -> (Vec<u32>, Vec<std::ops::Range<usize>>) {
 pub(super) fn rays_of_one_point<S: Strategy>(
     point: &ShadingPoint,
     strategy: &S,
+    portals: &[Portal],
     settings: &RenderSettings,
 ) -> Vec<(Vec3, Rgb)> {
     /// Enough for a map of them.
@@ -174,7 +174,7 @@ pub(super) fn rays_of_one_point<S: Strategy>(
         };
         let pixels: Vec<PixelPoints> = (0..N_PIXELS).map(pixel).collect();
         let tile =
-            TileShading { points: &points, samples: &numbers, pixels: &pixels, width: TILE_WIDTH };
+            TileShading { portals, ..TileShading::new(&points, &numbers, &pixels, TILE_WIDTH) };
         estimator.estimate(&pass, &tile, |asked, visible| {
             visible.fill(1.0);
             found.extend(asked.wi.iter().zip(&asked.weight).map(|(&wi, &w)| (wi, w * unit)));

@@ -71,19 +71,26 @@ pub(super) struct Allocation {
     n_samples: u32,
     /// The logarithm at which a pixel gets the default number; `None` if all pixels get that number.
     mean_log: Option<f32>,
+    /// Added to squared means, so that black pixels need few samples.
+    floor: f64,
     seen: Vec<Option<Seen>>,
     counts: Vec<u32>,
 }
 
 impl Allocation {
-    /// Begins a pass with `n_samples` per pixel on average, or in every pixel if `mean_log` is `None`.
+    /// Begins a pass with `n_samples` per pixel on average, or in every pixel if `mean_log` is `None`. `brightness` is the
+    /// mean luminance of the picture's surfaces, if it is known.
     pub(super) fn reset(
         &mut self,
         width: usize,
         n_pixels: usize,
         n_samples: u32,
         mean_log: Option<f32>,
+        brightness: Option<f32>,
     ) {
+        /// For pictures as bright as the light; darker ones have the square of their mean.
+        const FLOOR: f64 = 0.01;
+        self.floor = brightness.map_or(FLOOR, |mean| FLOOR.min(f64::from(mean).powi(2)));
         self.width = width;
         self.n_samples = n_samples;
         self.mean_log = mean_log;
@@ -103,13 +110,19 @@ impl Allocation {
         let n = f64::from(sums.n.max(1));
         let mean = sums.luminance / n;
         let variance = (sums.luminance_squared - mean * sums.luminance).max(0.0) / (n - 1.0);
-        let relative_variance = (variance / (mean * mean + 0.01)) as f32;
+        let relative_variance = (variance / (mean * mean + self.floor)) as f32;
         let known = in_sight && sums.n >= 2 && relative_variance.is_finite();
         self.seen[pixel] = Some(Seen {
             mean: mean as f32,
             relative_variance: known.then_some(relative_variance),
             coverage: sums.n_hits as f32 / n as f32,
         });
+    }
+
+    /// The mean luminance of a pixel that surfaces cover.
+    pub(super) fn covered_luminance(&self, pixel: usize) -> Option<f32> {
+        let Seen { mean, coverage, .. } = self.seen[pixel]?;
+        (coverage == 1.0 && mean.is_finite()).then_some(mean)
     }
 
     /// The number of pixels of the tile.
@@ -141,7 +154,7 @@ impl Allocation {
         let n = self.n_known(pixel) as f32;
         let mean = self.around(pixel).map(|seen| seen.mean).sum::<f32>() / n;
         let squares = self.around(pixel).map(|seen| functions::powi(seen.mean - mean, 2));
-        let between = squares.sum::<f32>() / n / (mean * mean + 0.01);
+        let between = squares.sum::<f32>() / n / (mean * mean + self.floor as f32);
         Some(if between.is_finite() { within.max(between) } else { within })
     }
 
@@ -244,7 +257,7 @@ mod tests {
     ) -> Vec<u32> {
         let mut allocation = Allocation::default();
         // As if the relative variance of the picture were 1e-3.
-        allocation.reset(WIDTH, WIDTH * WIDTH, n_samples, Some(log(1e-3)));
+        allocation.reset(WIDTH, WIDTH * WIDTH, n_samples, Some(log(1e-3)), None);
         for round in 0..N_LEVELS {
             allocation.assign(round);
             for i in (0..WIDTH * WIDTH).filter(|i| level(i % WIDTH, i / WIDTH) == round) {
@@ -336,7 +349,7 @@ mod tests {
         let counts = pass(8, |_| true, |_, _| PassSums::default());
         assert!(counts.iter().all(|n| counts[..].contains(n) && (2..=8).contains(n)));
         let mut even = Allocation::default();
-        even.reset(WIDTH, WIDTH * WIDTH, 8, None);
+        even.reset(WIDTH, WIDTH * WIDTH, 8, None, None);
         even.assign(3);
         assert_eq!(even.get(3), 8);
     }

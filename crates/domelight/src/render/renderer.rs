@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::film::{Film, FilmMismatch};
 use super::filter::FilterSampler;
 use super::layers::Layers;
-use super::scouts::scale;
+use super::scouts::scout;
 use super::sums::PixelSums;
 use super::tile::{Counts, Mark, Pass, Scratch, Tile};
 use super::tiling::{SampleSet, Tiling, Window, paired_pass};
@@ -292,9 +292,10 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let n_samples = samples.len() as u32;
         let shared = strategy.begin_pass(sampler, n_samples);
         let adaptive = settings.adapts(strategy);
-        let mut pass = Pass { n_samples, set, adaptive, mean_log: None, shared };
-        if adaptive {
-            pass.mean_log = scale(context, strategy, &pass);
+        let (mean_log, brightness) = (None, None);
+        let mut pass = Pass { n_samples, set, adaptive, mean_log, brightness, shared };
+        if adaptive && let Some(scouted) = scout(context, strategy, &pass) {
+            (pass.mean_log, pass.brightness) = (Some(scouted.mean_log), scouted.brightness);
         }
         pass
     }

@@ -31,6 +31,29 @@ struct Scout {
     fewest: i32,
     /// The expected number of its sets of samples.
     n_sets: f64,
+    /// The luminance, if surfaces cover it.
+    luminance: Option<f32>,
+}
+
+/// What scouts tell about a picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scouted {
+    /// The logarithm at which a pixel gets the default number of samples, so that the total over the picture is about
+    /// the number requested.
+    pub(super) mean_log: f32,
+    /// The mean luminance of surfaces, if a pixel shows nothing else.
+    pub(super) brightness: Option<f32>,
+}
+
+impl Scouted {
+    /// `None` if no scout sees the scene.
+    fn by(scouts: &[Scout], n: u32) -> Option<Self> {
+        let mean_log = mean_log(scouts, n)?;
+        let luminances = || scouts.iter().filter_map(|scout| scout.luminance);
+        let sum: f64 = luminances().map(f64::from).sum();
+        let brightness = (sum > 0.0).then(|| (sum / luminances().count() as f64) as f32);
+        Some(Self { mean_log, brightness })
+    }
 }
 
 impl Scout {
@@ -52,6 +75,7 @@ impl Scout {
             level: allocation.level(pixel),
             log: allocation.log(pixel),
             fewest: allocation.fewest(pixel),
+            luminance: allocation.covered_luminance(pixel),
             n_sets: if scratch.seen()[pixel] { 1.0 + second_sets } else { 1.0 },
         };
         (0..allocation.n_pixels()).filter(is_typical).map(scout)
@@ -100,18 +124,17 @@ fn mean_log(scouts: &[Scout], n: u32) -> Option<f32> {
     Some(high)
 }
 
-/// The logarithm at which a pixel gets the default number of samples, so that the total over the picture is about the
-/// number requested; `None` if no scout sees the scene.
+/// Sends scouts over the picture; `None` if no scout sees the scene.
 ///
 /// Scouts are windows of pixels, spread over the picture, with their own random numbers, because a scale that depends
 /// on a pixel's own samples would introduce bias. They are rendered twice: a few with the same number of samples in
 /// every pixel, which gives a first scale; then all of them with that scale, because a strategy that learns has less
 /// error with more samples to learn from.
-pub(super) fn scale<S: Strategy>(
+pub(super) fn scout<S: Strategy>(
     context: &RenderContext,
     strategy: &S,
     pass: &Pass<S>,
-) -> Option<f32> {
+) -> Option<Scouted> {
     /// The number of pixels of the picture per window. Scouts cost a fiftieth of the render, less for large pictures.
     const PIXELS_PER_WINDOW: usize = 20 * SCOUT_WINDOW * SCOUT_WINDOW;
     /// The minimum and maximum number of windows.
@@ -128,7 +151,7 @@ pub(super) fn scale<S: Strategy>(
     let sampler = Sampler::for_pass(settings.sampler, settings.seed, 0);
     let n_samples = (pass.n_samples / SAMPLES_DIVISOR).max(FEWEST_SAMPLES).min(pass.n_samples);
     let shared = strategy.begin_pass(sampler, n_samples);
-    let mut pass = Pass { n_samples, mean_log: None, shared, ..*pass };
+    let mut pass = Pass { n_samples, mean_log: None, brightness: None, shared, ..*pass };
     // Second sets of samples count toward the budget, except with a target error, where they are passes of their own.
     let second_sets = if settings.target_error.is_none() { SECOND_SETS } else { 0.0 };
     let scouts = |n: usize, pass: &Pass<S>| -> Vec<Scout> {
@@ -141,10 +164,11 @@ pub(super) fn scale<S: Strategy>(
             .flatten_iter()
             .collect()
     };
-    pass.mean_log = Some(mean_log(&scouts(FIRST, &pass), pass.n_samples)?);
+    let first = Scouted::by(&scouts(FIRST, &pass), pass.n_samples)?;
+    (pass.mean_log, pass.brightness) = (Some(first.mean_log), first.brightness);
     let [fewest, most] = N_WINDOWS;
     let n_windows = (width * height / PIXELS_PER_WINDOW).clamp(fewest, most);
-    mean_log(&scouts(n_windows, &pass), pass.n_samples)
+    Scouted::by(&scouts(n_windows, &pass), pass.n_samples)
 }
 
 /// About `n` windows of `size` × `size` pixels, or as large as the picture allows, one at a random position in each
@@ -188,6 +212,7 @@ mod tests {
                             log: (level > 0).then_some(log),
                             fewest: OCTAVES[0],
                             n_sets: 1.0,
+                            luminance: None,
                         }
                     })
                     .collect();
@@ -196,7 +221,10 @@ mod tests {
                 assert!((mean - 1.0).abs() < 1e-3, "{n} {range}: {mean}");
             }
         }
-        assert_eq!(mean_log(&[Scout { level: 0, log: None, fewest: 0, n_sets: 1.0 }], 8), None);
+        assert_eq!(
+            mean_log(&[Scout { level: 0, log: None, fewest: 0, n_sets: 1.0, luminance: None }], 8),
+            None
+        );
     }
 
     #[test]

@@ -133,6 +133,8 @@ pub(super) struct Pass<S: Strategy> {
     pub(super) adaptive: bool,
     /// The logarithm at which a pixel gets the default number; see [`super::allocation`].
     pub(super) mean_log: Option<f32>,
+    /// The mean luminance of the picture's surfaces, in multiples of the strategy's unit, if it is known.
+    pub(super) brightness: Option<f32>,
     pub(super) shared: S::Pass,
 }
 
@@ -287,7 +289,7 @@ impl Tile {
         let learns = n_rounds > 1;
         batch.adaptive = learns && pass.adaptive;
         let mean_log = pass.mean_log.filter(|_| batch.adaptive);
-        batch.allocation.reset(width, n_pixels, pass.n_samples, mean_log);
+        batch.allocation.reset(width, n_pixels, pass.n_samples, mean_log, pass.brightness);
         let hidden = context.settings.background == Background::Hidden;
         if self.pixels.is_empty() && hidden && !batch.seen.contains(&true) {
             self.n_missed += pass.n_samples;
@@ -297,7 +299,9 @@ impl Tile {
             return counts;
         }
         self.pixels.resize(n_pixels, PixelSums::missed(self.n_missed));
-        let strategy_context = StrategyContext { context, strategy, pass: &pass.shared, width };
+        let Pass { ref shared, brightness, .. } = *pass;
+        let strategy_context =
+            StrategyContext { context, strategy, pass: shared, width, brightness };
         let mut counts = Counts::default();
         // With a target error, every pixel has a second set.
         let one_in_many = learns && context.settings.target_error.is_none();
@@ -662,7 +666,7 @@ impl Batch {
             pixel.one_material = first.is_some() && constants.all(|&constant| constant == first);
         }
         self.origins.clear();
-        let origin = |p: &ShadingPoint| offset_origin(p.position, p.ng, context.extent);
+        let origin = |p: &ShadingPoint| visibility::origin_in_view(p, context.extent);
         self.origins.extend(self.points.iter().map(origin));
     }
 
@@ -674,10 +678,10 @@ impl Batch {
         scratch: &mut S::Scratch,
         observer: &(impl Observer + ?Sized),
     ) -> u64 {
-        let &StrategyContext { context, strategy, pass, width } = strategy_context;
+        let &StrategyContext { context, strategy, pass, .. } = strategy_context;
         observer.stage_started(Stage::Strategy);
         let Self { points, samples, pixels, origins, round: rays, .. } = self;
-        let tile = TileShading { points, samples, pixels, width };
+        let tile = strategy_context.tile(points, samples, pixels);
         rays.contributions.reset(points.len());
         strategy.push(pass, &tile, round, scratch, &mut rays.contributions);
 
@@ -711,7 +715,7 @@ impl Batch {
             round: ShadowRays { contributions: rays, visibility, .. },
             ..
         } = self;
-        let tile = TileShading { points, samples, pixels, width: strategy_context.width };
+        let tile = strategy_context.tile(points, samples, pixels);
         strategy_context.strategy.learn(&tile, rays, visibility, scratch);
     }
 
@@ -789,6 +793,21 @@ struct StrategyContext<'a, S: Strategy> {
     pass: &'a S::Pass,
     /// The number of pixels in a row of the tile.
     width: usize,
+    brightness: Option<f32>,
+}
+
+impl<'a, S: Strategy> StrategyContext<'a, S> {
+    /// The shading points of a round, as the strategy sees them.
+    fn tile(
+        &self,
+        points: &'a [ShadingPoint],
+        samples: &'a [u32],
+        pixels: &'a [PixelPoints],
+    ) -> TileShading<'a> {
+        let portals = self.context.scene.portals();
+        let &Self { width, brightness, .. } = self;
+        TileShading { points, samples, pixels, width, portals, brightness }
+    }
 }
 
 impl ShadowRays {

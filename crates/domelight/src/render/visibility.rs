@@ -20,8 +20,21 @@ pub fn visibility(scene: &Scene, point: &ShadingPoint, directions: &[Vec3]) -> V
 
 /// The origin of a shadow ray, off the surface on the side of its direction. `extent` is that of the scene.
 pub(crate) fn origin(point: &ShadingPoint, wi: Vec3, extent: f32) -> Vec3 {
-    let side = if point.ng.dot(wi) < 0.0 { -point.ng } else { point.ng };
-    offset_origin(point.position, side, extent)
+    if point.ng.dot(wi) < 0.0 {
+        offset_origin(point.position, -point.ng, extent)
+    } else {
+        origin_in_view(point, extent)
+    }
+}
+
+/// The origin of shadow rays off the viewer's side of the surface. A hit in a corner may be rounded to a point behind the
+/// other wall, so the origin is moved toward the viewer first: nothing is in between.
+pub(crate) fn origin_in_view(point: &ShadingPoint, extent: f32) -> Vec3 {
+    /// Relative to the coordinates of the point: some units in the last place.
+    const BACK: f32 = 1.0 / (1 << 19) as f32;
+    let back = BACK * point.position.abs().max_element();
+    let position = point.position + back * point.frame.to_world(point.wo);
+    offset_origin(position, point.ng, extent)
 }
 
 /// Scratch memory for tracing.

@@ -45,6 +45,8 @@ pub enum Dimension {
     Part = 5,
     /// The position on the camera's lens.
     Lens = 6,
+    /// Points on portals.
+    Portal = 7,
 }
 
 /// Four uniform random numbers for one index of one dimension.

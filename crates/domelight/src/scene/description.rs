@@ -14,6 +14,7 @@ use crate::RgbImage;
 use crate::environment::{Environment, EnvironmentError, Orientation, UpAxis};
 use crate::geometry::{Aabb, Mesh, conjugated};
 use crate::math::{DVec3, Mat4, functions};
+use crate::strategy::Portal;
 
 /// The description of a scene, from a loader or a built-in scene. [`Scene::new`](super::Scene::new) checks it.
 #[derive(Clone, Debug, Default)]
@@ -34,6 +35,8 @@ pub struct SceneDescription {
     pub view: Option<ViewDirection>,
     /// The environment, if the scene names one.
     pub environment: Option<EnvironmentSettings>,
+    /// Where light enters, such as windows: hints for strategies.
+    pub portals: Vec<Portal>,
     /// The indices of parts that are scenery, such as floors and plinths. Framing and the material of
     /// the subject ignore them.
     pub scenery: Vec<usize>,
@@ -198,7 +201,7 @@ impl SceneDescription {
         }
     }
 
-    /// Transforms the parts and the cameras by an affine matrix, which is in the coordinates of the file
+    /// Transforms the parts, the cameras and the portals by an affine matrix, which is in the coordinates of the file
     /// ([`SceneDescription::offset`]).
     pub fn transform(&mut self, m: &Mat4) {
         if self.offset == DVec3::ZERO {
@@ -259,6 +262,7 @@ impl SceneDescription {
         for camera in self.camera.iter_mut().chain(all) {
             camera.transform(m);
         }
+        self.portals = self.portals.iter().filter_map(|portal| portal.transformed(m)).collect();
     }
 
     /// Appends another scene's parts, and its camera and environment if this scene has none. An empty scene takes over
@@ -284,6 +288,7 @@ impl SceneDescription {
         self.camera = self.camera.take().or(other.camera);
         self.view = self.view.or(other.view);
         self.cameras.append(&mut other.cameras);
+        self.portals.append(&mut other.portals);
         self.environment = self.environment.take().or(other.environment);
         self.up = self.up.or(other.up);
     }

@@ -42,6 +42,11 @@ impl Scene {
                 f.text("catches shadows");
             }
         }
+        for portal in &self.portals {
+            let vectors = [portal.corner(), portal.edges()[0], portal.edges()[1]];
+            f.text("portal");
+            f.numbers(vectors.iter().flat_map(Vec3::to_array));
+        }
         if self.unit != 1.0 {
             f.numbers([self.unit]);
         }

@@ -46,6 +46,8 @@ pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, Uv
 use crate::bsdf::Bsdf;
 use crate::bvh::{self, Bvh, BvhError, InstructionSet};
 use crate::geometry::{Aabb, Mesh, MeshError, Similarity};
+use crate::math::{Mat4, Vec3};
+use crate::strategy::Portal;
 use coverage::Partial;
 use subject::{framed_points, usual_scale};
 
@@ -93,6 +95,8 @@ pub struct Scene {
     /// The camera and the up axis of the file, if it has them.
     camera: Option<CameraSettings>,
     up: UpAxis,
+    /// In units of the BVH.
+    portals: Vec<Portal>,
 }
 
 /// A copy of a part.
@@ -188,8 +192,18 @@ impl Scene {
         let scale = usual_scale(&bounds);
         check_size(&bounds, &subject_bounds, scale)?;
         let SceneDescription {
-            mut parts, instances, materials, textures, camera, up, view, ..
+            mut parts,
+            instances,
+            materials,
+            textures,
+            camera,
+            up,
+            view,
+            portals,
+            ..
         } = description;
+        let to_unit = Mat4::from_scale(Vec3::splat(scale));
+        let portals = portals.iter().filter_map(|portal| portal.transformed(&to_unit)).collect();
         let up = up.unwrap_or_default();
         if scale != 1.0 {
             for part in &mut parts {
@@ -252,6 +266,7 @@ impl Scene {
             unit: 1.0 / scale,
             camera,
             up,
+            portals,
         })
     }
 
@@ -307,6 +322,11 @@ impl Scene {
     /// [`Scene::camera_hit`] are in its units; [`Scene::camera_inside`] returns a camera whose rays are.
     pub fn unit(&self) -> f32 {
         self.unit
+    }
+
+    /// Where light enters, in units of the BVH; see [`SceneDescription::portals`].
+    pub fn portals(&self) -> &[Portal] {
+        &self.portals
     }
 
     /// Converts a camera from the units of the description to those of the BVH; see [`Scene::unit`]. Renders do this

@@ -19,6 +19,7 @@ mod estimator;
 pub mod levels;
 mod light_set;
 mod mis;
+mod portal;
 mod prepared;
 pub mod product;
 mod rejection;
@@ -30,6 +31,7 @@ pub use environment::EnvironmentSampling;
 pub use estimator::Estimator;
 pub use light_set::LightSet;
 pub use mis::{CompensationNeedsBrdf, LightTable, MultipleImportanceSampling};
+pub use portal::{Portal, PortalError};
 pub use prepared::{PrepareError, PreparedStrategy};
 pub use product::ProductSampling;
 pub use rejection::{
@@ -222,6 +224,23 @@ pub struct TileShading<'a> {
     pub pixels: &'a [PixelPoints],
     /// The number of pixels in a row of the tile.
     pub width: usize,
+    /// Rectangles through which light enters the scene, in the coordinates of the points: hints, which may be wrong.
+    pub portals: &'a [Portal],
+    /// The mean luminance of the picture's surfaces, in multiples of the strategy's unit, if it is known: a hint about
+    /// which errors are visible.
+    pub brightness: Option<f32>,
+}
+
+impl<'a> TileShading<'a> {
+    /// A tile of a scene without portals, in a picture of unknown brightness.
+    pub fn new(
+        points: &'a [ShadingPoint],
+        samples: &'a [u32],
+        pixels: &'a [PixelPoints],
+        width: usize,
+    ) -> Self {
+        Self { points, samples, pixels, width, portals: &[], brightness: None }
+    }
 }
 
 /// The points of one pixel.

@@ -210,7 +210,7 @@ fn room_scene() -> SceneDescription {
     let planks = glossy("planks", Rgb::new(0.36, 0.22, 0.12), 0.0, 0.4);
     let oak = glossy("oak", Rgb::new(0.48, 0.33, 0.19), 0.0, 0.5);
     let glaze = glossy("glaze", Rgb::new(0.10, 0.22, 0.40), 0.0, 0.25);
-    scene(
+    let description = scene(
         camera(60.0, vec3(-1.2, 1.5, 2.3), vec3(0.2, 1.0, -2.0)),
         [
             ("table", room::table(), oak),
@@ -218,7 +218,8 @@ fn room_scene() -> SceneDescription {
             ("walls", room::walls(), plaster),
             ("floor", room::floor(), planks),
         ],
-    )
+    );
+    SceneDescription { portals: room::window().into_iter().collect(), ..description }
 }
 
 fn sphere_scene(camera: CameraSettings) -> SceneDescription {

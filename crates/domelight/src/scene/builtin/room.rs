@@ -5,6 +5,7 @@
 use super::shapes::{arc, lathe};
 use crate::geometry::Mesh;
 use crate::math::{FRAC_PI_2, Mat4, Vec2, Vec3, vec2, vec3};
+use crate::strategy::Portal;
 
 /// Half the width and half the depth of the room, along x and z.
 const HALF: Vec2 = vec2(2.0, 2.5);
@@ -36,6 +37,12 @@ pub(crate) fn walls() -> Mesh {
         [vec3(x, low, -beside), vec3(x + t, high, -w)],
         [vec3(x, low, w), vec3(x + t, high, beside)],
     ])
+}
+
+/// The inner side of the window.
+pub(crate) fn window() -> Option<Portal> {
+    let ([low, high], w) = (WINDOW_HEIGHTS, WINDOW_HALF_WIDTH);
+    Portal::new(vec3(HALF.x, low, -w), [(high - low) * Vec3::Y, 2.0 * w * Vec3::Z]).ok()
 }
 
 /// The floor, whose upper side is at y = 0.

@@ -18,6 +18,10 @@
 //! exposure = 0.0                      # stops, default 0
 //! up = "y"                            # the map's up axis, default "y"
 //!
+//! [[portals]]                         # where light enters, such as a window: a hint against noise
+//! corner = [2.0, 1.0, -0.5]           # of a rectangle
+//! edges = [[0.0, 1.2, 0.0], [0.0, 0.0, 1.0]]
+//!
 //! [materials]
 //! clay = "diffuse:0.8"                # the command line's notation, see `bsdf::MaterialSpec`
 //!
@@ -75,6 +79,7 @@ use crate::scene::{
     MetallicRoughnessMaterial, NormalMap, SceneDescription, TextureRef, UpAxis, UvTransform, Wrap,
     offset,
 };
+use crate::strategy::{Portal, PortalError};
 
 /// An error in a scene file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -133,6 +138,9 @@ pub enum TomlErrorKind {
     /// An invalid camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
+    /// A portal without an area.
+    #[error(transparent)]
+    Portal(#[from] PortalError),
 }
 
 #[derive(Deserialize)]
@@ -146,6 +154,8 @@ struct SceneFile {
     materials: BTreeMap<String, Spanned<MaterialEntry>>,
     #[serde(default)]
     objects: Vec<Spanned<ObjectTable>>,
+    #[serde(default)]
+    portals: Vec<Spanned<PortalTable>>,
     /// How the scene is rendered, which is not the description's business.
     #[serde(default, rename = "file")]
     _file: IgnoredAny,
@@ -171,6 +181,13 @@ struct CameraTable {
     up: Option<[f32; 3]>,
     fov: Option<f32>,
     orthographic: Option<f32>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PortalTable {
+    corner: [f64; 3],
+    edges: [[f32; 3]; 2],
 }
 
 #[derive(Deserialize)]
@@ -419,6 +436,14 @@ impl Reader<'_> {
             let settings = camera_settings(&camera.into_inner(), file.up, offset)
                 .map_err(|kind| self.error(at, kind))?;
             self.loaded.description.camera = Some(settings);
+        }
+        for portal in file.portals {
+            let at = portal.span().start;
+            let PortalTable { corner, edges } = portal.into_inner();
+            let corner = (DVec3::from(corner) - self.loaded.description.offset).as_vec3();
+            let portal = Portal::new(corner, edges.map(Vec3::from))
+                .map_err(|e| self.error(at, TomlErrorKind::Portal(e)))?;
+            self.loaded.description.portals.push(portal);
         }
         Ok(())
     }

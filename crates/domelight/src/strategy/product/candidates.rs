@@ -1,17 +1,19 @@
-//! The candidates of a pixel: directions from the product table and from the BRDF, weighted by the
-//! balance heuristic.
+//! The candidates of a pixel: directions from the product table, from the BRDF and to portals, weighted by the balance
+//! heuristic.
 //!
-//! The n camera hits of the pixel share M strata of the table and N BRDF samples:
+//! The n camera hits of the pixel share M strata of the table, N BRDF samples and Q points on portals:
 //! stratum k belongs to hit (k − r) mod n with one random r, so every hit gets each stratum with
 //! probability 1/n. A candidate stands for
 //!
 //! ```text
-//! W = f(ω) L(ω) / (M p_table(ω) + N p_brdf(ω))        p_table = width(c)/total · L/W(c)
+//! W = f(ω) L(ω) m(ω) / (M p_table(ω))       of a stratum         p_table = width(c)/total · L/W(c)
+//! W = f(ω) L(ω)/q(ω)                         of another           m = M p₀/q     q = M p₀ + N p_brdf + Q p_portal
 //! ```
 //!
-//! where f and p_brdf are those of its hit. Σ W is an unbiased estimate of the mean over the hits of
-//! ∫ f L dω: for each hit, it is the multi-sample estimator of Veach & Guibas 1995 with expected counts
-//! M/n and N/n.
+//! where f, p_brdf and p_portal are those of its hit, and p₀ is p_table without visibility. Σ W is an unbiased estimate of the mean
+//! over the hits of ∫ f L dω: for each hit, it is the multi-sample estimator of Veach & Guibas 1995 with expected counts
+//! M/n, N/n and Q/n. Its weights sum to 1 for any p_table. They must not follow V̂, because V̂ was learned from the pool: the
+//! strata's part would then be a mean over the pool, the other part one over the map, of weights that hang together.
 
 use super::super::ShadingPoint;
 use super::brdf_samples::{BesideStrata, BrdfSampleBatch};
@@ -25,15 +27,16 @@ use super::table::Table;
 use crate::Rgb;
 use crate::bsdf::Bsdf;
 use crate::environment::Environment;
-use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat, SimdI32x8};
+use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat, SimdI32x8, Vectors};
+use crate::strategy::portal::Portals;
 
 /// The candidates of a pixel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Candidates {
     /// Candidates from the table, with the same number of blocks for each hit.
     pub(super) lights: Vec<CandidateBlock>,
-    /// Candidates from the BRDF.
-    pub(super) brdf: Vec<Candidate>,
+    /// Candidates from the BRDF and from portals.
+    pub(super) others: Vec<Candidate>,
     /// The assignment of strata to hits.
     pub(super) assignment: StratumAssignment,
     /// The slot of each stratum, where `lights` has its candidate.
@@ -50,6 +53,7 @@ pub(super) struct Sources<'a> {
     pub(super) cells: &'a Cells,
     pub(super) pool: &'a LightSamplePool,
     pub(super) table: &'a Table,
+    pub(super) portals: Portals<'a>,
     /// `None` if visibility is unknown.
     pub(super) control_variate: Option<&'a ControlVariate>,
 }
@@ -71,11 +75,15 @@ impl Sources<'_> {
         let assignment =
             StratumAssignment::new(n_strata, hits.points.len(), numbers.strata_shift());
         let strata = Strata::new(n_strata, numbers.strata, total);
-        let scale = if n_strata > 0 { n_strata as f32 / total } else { 0.0 };
+        let per = |total: f32| if n_strata > 0 { n_strata as f32 / total } else { 0.0 };
+        let (scale, product_scale) = (per(total), per(self.table.product_total()));
         candidates.assignment = assignment;
         // Begin with the BRDF samples, because their texels take long to arrive.
         let drawn = &mut candidates.drawn;
-        BrdfSampleBatch::draw(simd, self.environment, hits, numbers, counts.brdf, drawn);
+        drawn.clear();
+        let portals = (self.portals, counts.portal);
+        BrdfSampleBatch::draw(simd, self.environment, hits, numbers, counts.brdf, portals, drawn);
+        BrdfSampleBatch::draw_portals(simd, self.environment, hits, numbers, portals, drawn);
         candidates.lights.clear();
         if n_strata > 0 {
             let Candidates { slots, cell_starts, .. } = &mut *candidates;
@@ -83,7 +91,8 @@ impl Sources<'_> {
         }
         for (hit, at) in hits.points.iter().enumerate() {
             let (bsdf, diffuse) = (hits.bsdf(hit), diffuse[hit]);
-            let of_hit = HitContext { at, bsdf, diffuse, scale, n_brdf: counts.brdf as f32 };
+            let [n_brdf, n_portal] = [counts.brdf, counts.portal].map(|n| n as f32);
+            let of_hit = HitContext { at, bsdf, diffuse, scale, product_scale, n_brdf, n_portal };
             for block in 0..assignment.blocks() {
                 let first = assignment.first(hit) + block * LANES * assignment.n_hits;
                 let positions = strata.positions(simd, first, assignment.n_hits);
@@ -92,12 +101,12 @@ impl Sources<'_> {
                 candidates.lights.push(self.draw_lights(simd, &of_hit, slots, positions, n));
             }
         }
-        candidates.brdf.clear();
+        candidates.others.clear();
         let Self { environment, cells, table, .. } = *self;
         let n_brdf = counts.brdf as f32;
-        let beside = BesideStrata { environment, cells, table, strata: scale, n_brdf };
+        let beside = BesideStrata { environment, cells, table, strata: product_scale, n_brdf };
         for drawn in &candidates.drawn {
-            drawn.weigh(simd, &beside, &mut candidates.brdf);
+            drawn.weigh(simd, &beside, &mut candidates.others);
         }
     }
 
@@ -115,8 +124,17 @@ impl Sources<'_> {
         let inside = self.table.inside(slots, positions);
         let LightSamples { wi, le, density } = self.pool.get(simd, slots, inside);
         let (f, pdf) = of_hit.at.eval_lanes(of_hit.bsdf, wi);
+        let product = one(of_hit.product_scale) * self.table.products(slots) * density;
         let density = one(of_hit.scale) * self.table.widths(slots) * density;
-        let weight = one(1.0) / (density + one(of_hit.n_brdf) * pdf);
+        let mut weight = one(1.0) / density;
+        if of_hit.n_brdf + of_hit.n_portal > 0.0 {
+            let mut all = product + one(of_hit.n_brdf) * pdf;
+            if of_hit.n_portal > 0.0 {
+                let from = Vectors::splat(pdf, of_hit.at.position);
+                all = all + one(of_hit.n_portal) * self.portals.pdf(from, wi);
+            }
+            weight = weight * (product / all);
+        }
         let there = simd.iota().to_f32().lt(one(n as f32));
         let weight = SimdFloat::select(there, weight, one(0.0));
         let value = f.zip(le, |f, le| f * le).scaled(weight);
@@ -149,6 +167,10 @@ struct HitContext<'a> {
     diffuse: Rgb,
     /// M divided by the total of the table.
     scale: f32,
+    /// M divided by the total without visibility.
+    product_scale: f32,
     /// N.
     n_brdf: f32,
+    /// Q.
+    n_portal: f32,
 }

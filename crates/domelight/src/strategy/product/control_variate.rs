@@ -104,6 +104,17 @@ impl ControlVariate {
         }
     }
 
+    /// Multiplies h in a pair of rows of cells.
+    #[inline(always)]
+    pub(super) fn scale<S: Simd>(&mut self, simd: S, pair: usize, factor: S::F32x16) {
+        self.above.set_pair(pair, self.above.pair(simd, pair) * factor);
+        if self.tint.is_some() {
+            for sum in &mut self.gloss {
+                sum.set_pair(pair, sum.pair(simd, pair) * factor);
+            }
+        }
+    }
+
     /// The integral over all cells, each multiplied by its visibility in `visible`.
     #[inline(always)]
     pub(super) fn integral<S: Simd>(
@@ -192,6 +203,7 @@ mod tests {
     use crate::sampling::{Sampler, SamplerKind};
     use crate::simd::{InstructionSet, Kernel, LANES, dispatch, lane_of};
     use crate::strategy::ShadingPoint;
+    use crate::strategy::portal::Portals;
     use testkit::ZTest;
 
     /// The candidates of a pixel with several hits, and the data to check them.
@@ -217,11 +229,16 @@ mod tests {
                 (ControlVariate::default(), Candidates::default());
             groups.cluster(hits);
             table.fill::<S, true>(simd, cells, &groups.all, &mut control_variate);
+            table.keep_product(simd, cells);
+            let (std_dev, is_glossy) = (self.visible, groups.is_glossy());
+            let above = &control_variate.above;
+            table.weight_by_visibility(simd, cells, above, (self.visible, std_dev), is_glossy);
             table.accumulate(simd, cells);
-            let counts = Counts { light: 40, brdf: 4 };
-            control_variate.balance(simd, cells, groups.brdf_share(counts, table.total()));
+            let counts = Counts { light: 40, brdf: 4, portal: 0 };
+            control_variate.balance(simd, cells, groups.brdf_share(counts, table.product_total()));
             let numbers = PixelSamples::new(Sampler::new(SamplerKind::Independent, self.seed, 0));
             let sources = Sources {
+                portals: Portals::new(&[]),
                 environment,
                 cells,
                 pool,
@@ -255,7 +272,7 @@ mod tests {
         let pool = LightSamplePool::draw(&cells, &environment, sampler, PassLength::Short);
         let mut visible = ZERO_CELLS;
         for (i, v) in visible.iter_mut().flatten().enumerate() {
-            *v = (i % 7) as f32 / 6.0;
+            *v = 0.01 + (i % 7) as f32 / 7.0;
         }
         let materials =
             ["diffuse:0.8,0.5,0.2", "ggx:0.2", "ward:0.15:0.5", "phong:50:0.5:0.5", "beckmann:0.3"];

@@ -18,8 +18,10 @@ use super::systematic::SystematicSampler;
 use super::visibility::{Blocks, VisibilityStats};
 use super::{LightSamplePool, ProductSampling, ProductScratch, TOLERANCE};
 use crate::Rgb;
+use crate::math::{Vec3, functions};
 use crate::simd::{Kernel, Simd};
 use crate::strategy::levels::coarser;
+use crate::strategy::portal::Portals;
 use crate::strategy::{Contributions, PixelPoints, ShadingPoint, TileShading};
 
 /// Estimates a tile in one round.
@@ -43,7 +45,8 @@ impl Kernel for TileEstimator<'_, '_> {
         let blocks = tile.blocks();
         if !pilots {
             let ProductScratch { visibility, visibility_stats, .. } = &mut *self.scratch;
-            visibility.estimate(simd, self.cells, visibility_stats, blocks);
+            let has_portals = !tile.portals.is_empty();
+            visibility.estimate(simd, self.cells, visibility_stats, blocks, has_portals);
         }
         self.scratch.targets.clear();
         self.scratch.sampled_pixels.clear();
@@ -67,9 +70,12 @@ impl TileEstimator<'_, '_> {
         self.scratch.sampled_pixels.push(i);
         // Group the hits by surface and normal, and divide the candidates between light and BRDF.
         self.scratch.groups.cluster(hits);
-        let counts = self.strategy.counts(&self.scratch.groups, points.len(), self.pilots);
+        let has_portals = !tile.portals.is_empty();
+        let counts =
+            self.strategy.counts(&self.scratch.groups, points.len(), self.pilots, has_portals);
         // Tabulate light times reflectance over the cells (Clarberg & Akenine-Möller 2008, section 3).
-        self.tabulate_product(simd, block, counts);
+        let position = points.iter().map(|p| p.position).sum::<Vec3>() / points.len() as f32;
+        self.tabulate_product(simd, block, counts, position);
         // Draw candidates from the table and from the BRDF, weighted by the balance heuristic (Veach 1997, eq. 9.8).
         let numbers = self.pixel_numbers(pixel);
         self.draw_candidates(simd, hits, counts, &numbers);
@@ -88,25 +94,33 @@ impl TileEstimator<'_, '_> {
 
     /// Fills the table and, except for pilots, the control variate.
     ///
-    /// For diffuse pixels, where the control variate is exact, the density is proportional to the uncertainty of
-    /// visibility.
+    /// Strata follow the light times the uncertainty of visibility, but the balance heuristic weights them by the product
+    /// alone, because BRDF samples do not come from the pool from which visibility was learned.
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
-    fn tabulate_product<S: Simd>(&mut self, simd: S, block: usize, counts: Counts) {
+    fn tabulate_product<S: Simd>(&mut self, simd: S, block: usize, counts: Counts, position: Vec3) {
         let cells = self.cells;
-        let ProductScratch { groups, table, control_variate, visibility, .. } = &mut *self.scratch;
+        let ProductScratch { groups, table, control_variate, visibility, strata_share, .. } =
+            &mut *self.scratch;
+        let portals = Portals::new(self.tile.portals);
         if self.pilots {
             table.fill::<S, false>(simd, cells, &groups.all, control_variate);
+            table.keep_product(simd, cells);
             table.accumulate(simd, cells);
             return;
         }
         table.fill::<S, true>(simd, cells, &groups.all, control_variate);
-        if !groups.is_glossy() {
-            let (visible, std_dev) = visibility.of(block);
-            table.weight_by_variance(simd, cells, &control_variate.above, visible, std_dev);
+        table.keep_product(simd, cells);
+        if counts.portal > 0 {
+            let strata = counts.light as f32 / table.product_total().max(f32::MIN_POSITIVE);
+            let portals = (portals, counts.portal);
+            strata_share.fill(simd, cells, table, portals, strata, position);
+            strata_share.apply(simd, cells, table, control_variate);
         }
+        let (above, is_glossy) = (&control_variate.above, groups.is_glossy());
+        table.weight_by_visibility(simd, cells, above, visibility.of(block), is_glossy);
         table.accumulate(simd, cells);
-        control_variate.balance(simd, cells, groups.brdf_share(counts, table.total()));
+        control_variate.balance(simd, cells, groups.brdf_share(counts, table.product_total()));
     }
 
     /// The random numbers of a pixel in the pass.
@@ -128,7 +142,8 @@ impl TileEstimator<'_, '_> {
         let (environment, cells, pool) = (&*self.strategy.environment, self.cells, self.pool);
         let ProductScratch { groups, table, control_variate, candidates, .. } = &mut *self.scratch;
         let control_variate = (!self.pilots).then_some(&*control_variate);
-        let sources = Sources { environment, cells, pool, table, control_variate };
+        let portals = Portals::new(self.tile.portals);
+        let sources = Sources { environment, cells, pool, table, portals, control_variate };
         sources.draw(simd, hits, &groups.diffuse, counts, numbers, candidates);
     }
 
@@ -163,8 +178,8 @@ impl TileEstimator<'_, '_> {
         let n_points = pixel.points.len() as f32;
         // Limit the brightness by the pixel's own estimate, because it may lie in a shadow or next to a highlight.
         let brightness = strategy.expected_brightness(tile, &self.scratch.visibility_stats, i);
-        let brightness = brightness.min(strategy.brightness(known));
-        let n = (counts.light + counts.brdf) as f32;
+        let brightness = brightness.min(functions::hypot(known, strategy.dark(tile)));
+        let n = counts.total() as f32;
         let tolerance = TOLERANCE[usize::from(self.scratch.groups.is_glossy())];
         let covered = n_points / pixel.n_samples as f32;
         covered * n / (tolerance * brightness)
@@ -207,8 +222,9 @@ impl ProductSampling<'_> {
     ) -> f32 {
         let around = coarser(pixel, tile.width, tile.pixels.len());
         let known = around.filter_map(|i| visibility_stats.luminance(i));
-        let add = |(n, sum), luminance| (n + 1.0, sum + 1.0 / self.brightness(luminance));
+        let dark = self.dark(tile);
+        let add = |(n, sum), luminance| (n + 1.0, sum + 1.0 / functions::hypot(luminance, dark));
         let (n, sum) = known.fold((0.0, 0.0), add);
-        if n > 0.0 { n / sum } else { self.dark }
+        if n > 0.0 { n / sum } else { dark }
     }
 }

@@ -5,8 +5,9 @@
 //! together:
 //!
 //! 1. A `table` holds the light times the reflectance of each cell.
-//! 2. `candidates` are strata along the curve, each with one direction from the pool, and BRDF samples where the table
-//!    approximates the BRDF badly, weighted by the balance heuristic.
+//! 2. `candidates` are strata along the curve, each with one direction from the pool, BRDF samples where the table
+//!    approximates the BRDF badly, and points on portals if the scene has any (`portal_light`), weighted by the balance
+//!    heuristic.
 //! 3. The tile's pixels are processed in [levels](super::levels). Pixels of the first level, the *pilots*, trace all
 //!    their candidates. From the rays of each level, the tile learns the `visibility` V̂ of each cell and the
 //!    brightness of its pixels.
@@ -17,14 +18,14 @@
 //! base = Σ_c V̂_c ∫ h L + Σ_j V̂_j (W_j − h_j L_j/p_j) − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
 //! ```
 //!
-//!    For diffuse pixels, where the control variate is exact, the density is proportional to the uncertainty of
-//!    visibility.
+//!    The density of strata is proportional to light, reflectance and the uncertainty of visibility.
 //!
 //! The expectation is ∫ f L V dω for every V̂, brightness and pool, provided that they do not depend on the random
-//! numbers of strata, BRDF samples and selection. V̂ and brightness come from pixels of lower levels, and each pixel
+//! numbers of strata, BRDF samples, portals and selection. V̂ and brightness come from pixels of lower levels, and each pixel
 //! and pass has its own sampler. V̂ and the candidates share the pool, which does no harm: given the pool, strata
 //! draw only from it, and the expectation of their part is a sum over the pool for any V̂ and any density derived
-//! from it. BRDF samples do not come from the pool, so if there are any, the density depends only on the pixel's hits.
+//! from it. BRDF samples and points on portals do not come from the pool, so the weights that divide the light between them
+//! and strata depend only on the pixel's hits.
 //!
 //! Related: Clarberg & Akenine-Möller 2008, "Practical Product Importance Sampling for Direct
 //! Illumination", multiplies trees of BRDF and map; Atanasov et al. 2018, "Adaptive Environment
@@ -38,6 +39,7 @@ mod control_variate;
 mod estimator;
 mod hits;
 mod light_samples;
+mod portal_light;
 mod rays;
 mod strata;
 mod systematic;
@@ -54,7 +56,6 @@ use super::levels::N_LEVELS;
 use super::{Contributions, PixelPoints, Strategy, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
-use crate::math::functions;
 use crate::sampling::Sampler;
 use crate::simd::{InstructionSet, dispatch};
 use candidates::Candidates;
@@ -63,6 +64,7 @@ use control_variate::ControlVariate;
 use estimator::TileEstimator;
 use hits::Groups;
 use light_samples::PassLength;
+use portal_light::StrataShare;
 use strata::{CandidateIndex, Counts};
 use table::Table;
 use visibility::{VisibilityEstimate, VisibilityStats};
@@ -82,6 +84,9 @@ const MAX_CANDIDATES: u32 = 1 << 14;
 /// view is oblique, and for lobes narrower than most cells.
 const BRDF_SHARE: [usize; 2] = [8, 4];
 
+/// One candidate in this many is a point on a portal if there are portals.
+const PORTAL_SHARE: usize = 2;
+
 /// The roughness below which a lobe is narrower than most cells.
 const NARROW: f32 = 0.1;
 
@@ -92,6 +97,9 @@ const TOLERANCE: [f32; 2] = [0.15, 0.35];
 /// For pixels darker than this fraction of the environment's mean, the tolerated error stops shrinking.
 const DARK: f32 = 0.15;
 
+/// The same as a fraction of the mean of the picture's surfaces, for pictures darker than the environment: rooms.
+const DARK_IN_PICTURE: f32 = 0.5;
+
 /// Product sampling: up to N rays per camera sample, in proportion to light, reflectance and learned visibility.
 #[derive(Clone, Debug)]
 pub struct ProductSampling<'a> {
@@ -99,7 +107,7 @@ pub struct ProductSampling<'a> {
     environment: Cow<'a, Environment>,
     /// The cells of short passes and of long ones; empty under a black sky.
     cells: Option<[Cells; 2]>,
-    /// The luminance below which brightness is ignored.
+    /// The luminance below which brightness is ignored, unless the picture is darker.
     dark: f32,
     n_rays: u32,
     instruction_set: InstructionSet,
@@ -133,18 +141,20 @@ impl<'a> ProductSampling<'a> {
     }
 
     /// The total number of candidates over the hits of a pixel.
-    fn counts(&self, groups: &Groups, n_hits: usize, pilot: bool) -> Counts {
+    fn counts(&self, groups: &Groups, n_hits: usize, pilot: bool, has_portals: bool) -> Counts {
         let times = if pilot && PassLength::new(n_hits) == PassLength::Short { PILOT } else { 1 };
         let all = self.n_rays as usize * n_hits * times;
         let share = match groups.narrowest() {
             Some(width) if width < NARROW => BRDF_SHARE[1],
             Some(width) if !groups.is_well_tabulated(width) => BRDF_SHARE[0],
-            _ => return Counts { light: all, brdf: 0 },
+            _ if !has_portals => return Counts { light: all, brdf: 0, portal: 0 },
+            _ => usize::MAX,
         };
-        // Strata correct the control variate, so there must be one beside a BRDF sample.
+        // Strata correct the control variate, so there must be one beside another sample.
         let all = all.max(2);
-        let brdf = all.div_ceil(share);
-        Counts { light: all - brdf, brdf }
+        let brdf = if share < usize::MAX { all.div_ceil(share) } else { 0 };
+        let portal = if has_portals { (all - brdf) / PORTAL_SHARE } else { 0 };
+        Counts { light: all - brdf - portal, brdf, portal }
     }
 
     /// The cells of a pass.
@@ -156,9 +166,9 @@ impl<'a> ProductSampling<'a> {
         })
     }
 
-    /// The brightness against which the error of a pixel is measured.
-    fn brightness(&self, luminance: f32) -> f32 {
-        functions::hypot(luminance, self.dark)
+    /// The luminance in a picture below which brightness is ignored.
+    fn dark(&self, tile: &TileShading) -> f32 {
+        tile.brightness.map_or(self.dark, |mean| self.dark.min(DARK_IN_PICTURE * mean))
     }
 }
 
@@ -171,6 +181,7 @@ pub struct ProductScratch {
     candidates: Candidates,
     /// The candidates of the chosen strata.
     chosen: Vec<CandidateIndex>,
+    strata_share: StrataShare,
     visibility: VisibilityEstimate,
     /// The slot of each ray's cell in this round.
     targets: Vec<u16>,

@@ -52,7 +52,7 @@ impl Rays<'_> {
                 self.push(&c, c.value * scale);
             }
         }
-        for c in candidates.brdf.iter().filter(|c| c.luminance > 0.0) {
+        for c in candidates.others.iter().filter(|c| c.luminance > 0.0) {
             self.push(c, c.value * scale);
         }
     }
@@ -67,7 +67,7 @@ impl Rays<'_> {
         importance: f32,
     ) {
         let scale = self.scale();
-        let Candidates { lights, brdf, assignment, .. } = candidates;
+        let Candidates { lights, others, assignment, .. } = candidates;
         for (hit, blocks) in lights.chunks_mut(assignment.blocks().max(1)).enumerate() {
             let mut sums = [simd.splat(0.0); 3];
             for c in blocks {
@@ -82,7 +82,7 @@ impl Rays<'_> {
             }
             *self.base(hit as u32) += Colors(sums).sum() * scale;
         }
-        for c in brdf {
+        for c in others {
             let slot = c.slot as usize;
             *self.base(c.hit) += c.value * (scale * get(visible, slot));
             c.selection_probability = probability(c.luminance * get(std_dev, slot) * importance);
@@ -98,7 +98,7 @@ impl Rays<'_> {
         mut systematic_sampler: SystematicSampler,
         chosen: &mut Vec<CandidateIndex>,
     ) {
-        let Candidates { lights, brdf, assignment, .. } = candidates;
+        let Candidates { lights, others, assignment, .. } = candidates;
         chosen.resize(lights.len() * LANES + 1, CandidateIndex::default());
         let mut n_chosen = 0;
         for index in assignment.indices() {
@@ -111,7 +111,7 @@ impl Rays<'_> {
         for &CandidateIndex { hit, lane } in &chosen[..n_chosen] {
             self.push_one(&lights[lane / LANES].get(lane % LANES, hit as u32), visible);
         }
-        for c in brdf.iter().filter(|c| systematic_sampler.select(c.selection_probability)) {
+        for c in others.iter().filter(|c| systematic_sampler.select(c.selection_probability)) {
             self.push_one(c, visible);
         }
     }

@@ -10,6 +10,14 @@ pub(super) struct Counts {
     pub(super) light: usize,
     /// BRDF samples.
     pub(super) brdf: usize,
+    /// Points on portals.
+    pub(super) portal: usize,
+}
+
+impl Counts {
+    pub(super) fn total(self) -> usize {
+        self.light + self.brdf + self.portal
+    }
 }
 
 /// The assignment of strata to hits: stratum k belongs to hit (k − r) mod n.
@@ -120,8 +128,8 @@ impl PixelSamples {
         Self { strata, choice, shift: [a, b], sampler }
     }
 
-    /// The hit of BRDF sample `j`, of `n` hits.
-    pub(super) fn brdf_hit(&self, j: usize, n: usize) -> usize {
+    /// The hit of BRDF sample or portal sample `j`, of `n` hits.
+    pub(super) fn hit_of_sample(&self, j: usize, n: usize) -> usize {
         (j + (self.shift[1] * n as f32) as usize) % n
     }
 

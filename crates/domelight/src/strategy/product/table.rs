@@ -10,6 +10,9 @@
 //! positive diffuse weight, so the table is a valid density for everything that the pixel reflects. The
 //! tails of narrow lobes may vanish in single-precision sums; BRDF samples cover them.
 //!
+//! Where visibility is known, the density of strata follows its uncertainty too ([`Table::weight_by_visibility`]), and
+//! the table without visibility remains as the density in the balance heuristic ([`Table::keep_product`]).
+//!
 //! The running sum of the table is a distribution along the curve. Its M strata share one random
 //! offset: stratum k is at u = (k + ξ)/M.
 
@@ -37,6 +40,9 @@ pub(super) struct Table {
     cosine: CellArray,
     /// The sum over all cells.
     total: f32,
+    /// Light times reflectance without visibility, and its sum.
+    product: CellArray,
+    product_total: f32,
 }
 
 impl Default for Table {
@@ -47,6 +53,8 @@ impl Default for Table {
             end: ZERO_CELLS,
             cosine: ZERO_CELLS,
             total: 0.0,
+            product: ZERO_CELLS,
+            product_total: 0.0,
         }
     }
 }
@@ -102,25 +110,41 @@ impl Table {
         }
     }
 
-    /// Weights the table of a diffuse pixel by uncertainty: that of visibility, `std_dev`, and that of the light of
-    /// cells across the horizon.
+    /// Keeps light times reflectance as the density that the balance heuristic assumes for strata.
     #[inline(always)]
-    pub(super) fn weight_by_variance<S: Simd>(
+    pub(super) fn keep_product<S: Simd>(&mut self, simd: S, cells: &Cells) {
+        let mut sum = simd.splat(0.0);
+        for row in cells.rows() {
+            let product = simd.load(&self.weight[row]) * simd.load(&cells.mass[row]);
+            self.product[row] = product.store();
+            sum = sum + product;
+        }
+        self.product_total = sum.sum();
+    }
+
+    /// Weights the table by the root mean square of what a candidate adds: the uncertainty of visibility, `std_dev`, and
+    /// the part of the visible light that the control variate leaves. For diffuse pixels, this is light of cells across
+    /// the horizon.
+    #[inline(always)]
+    pub(super) fn weight_by_visibility<S: Simd>(
         &mut self,
         simd: S,
         cells: &Cells,
         above: &CellArray,
-        visible: &CellArray,
-        std_dev: &CellArray,
+        (visible, std_dev): (&CellArray, &CellArray),
+        is_glossy: bool,
     ) {
         /// The relative variance that the control variate leaves in the light of a cell across the horizon.
         const ACROSS: f32 = 0.1;
+        /// The same for a cell of a glossy pixel.
+        const GLOSSY: f32 = 0.15;
         let one = |x| simd.splat_f32x16(x);
+        let [to_horizon, least] = if is_glossy { [0.0, GLOSSY] } else { [ACROSS, 0.0] };
         for pair in cells.pairs() {
-            let across = one(1.0) - above.pair(simd, pair);
-            let light = visible.pair(simd, pair).squared() * across * one(ACROSS);
-            let uncertainty = (std_dev.pair(simd, pair).squared() + light).sqrt();
-            self.weight.set_pair(pair, self.weight.pair(simd, pair) * uncertainty);
+            let left = (one(1.0) - above.pair(simd, pair)) * one(to_horizon) + one(least);
+            let light = visible.pair(simd, pair).squared() * left;
+            let rms = (std_dev.pair(simd, pair).squared() + light).sqrt();
+            self.weight.set_pair(pair, self.weight.pair(simd, pair) * rms);
         }
     }
 
@@ -284,6 +308,29 @@ impl Table {
         self.total
     }
 
+    /// The sum over all cells of light times reflectance.
+    pub(super) fn product_total(&self) -> f32 {
+        self.product_total
+    }
+
+    /// The parts of [`Table::product_total`] of a pair of rows of cells.
+    #[inline(always)]
+    pub(super) fn product_of<S: Simd>(&self, simd: S, pair: usize) -> S::F32x16 {
+        self.product.pair(simd, pair)
+    }
+
+    /// Multiplies the weights of a pair of rows of cells.
+    #[inline(always)]
+    pub(super) fn scale<S: Simd>(&mut self, simd: S, pair: usize, factor: S::F32x16) {
+        self.weight.set_pair(pair, self.weight.pair(simd, pair) * factor);
+    }
+
+    /// The parts of [`Table::product_total`] of the cells in `slots`.
+    #[inline(always)]
+    pub(super) fn products<F: SimdF32x8>(&self, slots: F::I32x8) -> F {
+        F::gather(&self.product, slots)
+    }
+
     /// The parts of [`Table::total`] of the cells in `slots`.
     #[inline(always)]
     pub(super) fn widths<F: SimdF32x8>(&self, slots: F::I32x8) -> F {
@@ -396,7 +443,7 @@ fn frame_vector<F: SimdFloat>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
 
 /// The centers of a pair of rows of cells.
 #[inline(always)]
-fn center<S: Simd>(simd: S, cells: &Cells, pair: usize) -> Vectors<S::F32x16> {
+pub(super) fn center<S: Simd>(simd: S, cells: &Cells, pair: usize) -> Vectors<S::F32x16> {
     let [x, y, z] = &cells.center;
     Vectors { x: x.pair(simd, pair), y: y.pair(simd, pair), z: z.pair(simd, pair) }
 }

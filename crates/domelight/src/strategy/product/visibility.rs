@@ -18,6 +18,7 @@
 //! selection. For that reason, V̂ comes only from pixels of lower levels.
 
 use super::cells::{CellArray, Cells, MAX_ROWS, ZERO_CELLS, get_mut};
+use super::portal_light::PORTAL_ROW;
 use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat};
 
 /// The number of pixels along the side of a block.
@@ -118,7 +119,9 @@ impl VisibilityEstimate {
         cells: &Cells,
         visibility_stats: &VisibilityStats,
         blocks: Blocks,
+        has_portals: bool,
     ) {
+        let portals = has_portals.then_some(PORTAL_ROW);
         let one = simd.splat(1.0);
         let VisibilityStats { rays, free, .. } = visibility_stats;
         let n_rows = cells.rows().end;
@@ -135,15 +138,20 @@ impl VisibilityEstimate {
             let [n, k] = &tile[row];
             prior[row] = ((simd.load(k) + all) / (simd.load(n) + one)).store();
         }
+        let mut prior_of_portals = [0.0; LANES];
+        if let Some(row) = portals {
+            let [n, k] = [sum(simd, rays, row), sum(simd, free, row)];
+            prior_of_portals = ((k + one) / (n + one)).store();
+        }
         self.visible.resize(blocks.len(), ZERO_CELLS);
         self.std_dev.resize(blocks.len(), ZERO_CELLS);
         for block in 0..blocks.len() {
             let neighbors = blocks.neighbors(block);
             let (visible, std_dev) = (&mut self.visible[block], &mut self.std_dev[block]);
-            for row in cells.rows() {
+            for row in cells.rows().chain(portals) {
                 let n = around(simd, rays, block, &neighbors, row, n_rows);
                 let k = around(simd, free, block, &neighbors, row, n_rows);
-                let p = simd.load(&prior[row]);
+                let p = simd.load(prior.get(row).unwrap_or(&prior_of_portals));
                 let v = ((k + p) / (n + one)).min(one);
                 visible[row] = v.store();
                 let differ = simd.splat(0.5) * p * (one - p) + simd.splat(0.005);
@@ -211,7 +219,7 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> VisibilityEstimate {
             let mut visibility = VisibilityEstimate::default();
-            visibility.estimate(simd, self.0, self.1, self.2);
+            visibility.estimate(simd, self.0, self.1, self.2, false);
             visibility
         }
     }

@@ -207,6 +207,9 @@ pub enum GltfErrorKind {
         /// Why it is unusable.
         problem: String,
     },
+    /// A portal without an area in strict mode.
+    #[error("a portal without an area; without --strict, it is left out")]
+    Portal,
     /// Attributes of instances with different lengths.
     #[error("an attribute of its instances has {count} values, another {instances}")]
     Instances {

@@ -14,6 +14,7 @@ use super::json;
 use super::source::Source;
 use crate::math::{DVec3, Mat4, Vec3};
 use crate::scene::{CameraSettings, NamedCamera, Projection, offset};
+use crate::strategy::Portal;
 
 const MAX_DEPTH: usize = 200;
 
@@ -36,6 +37,8 @@ pub(super) struct Graph<'g, 's> {
     pub(super) offset: DVec3,
     /// The index of each placed camera, the name of its node, and its place.
     cameras: Vec<(usize, String, DMat4)>,
+    /// The mesh of each node that is a portal, and its place.
+    portals: Vec<(usize, DMat4)>,
     /// World transforms of the visited nodes.
     worlds: Vec<Option<DMat4>>,
     /// The joints of skins.
@@ -57,6 +60,7 @@ impl<'g, 's> Graph<'g, 's> {
             placements: BTreeMap::new(),
             offset: DVec3::ZERO,
             cameras: Vec::new(),
+            portals: Vec::new(),
             worlds: vec![None; document.count::<json::Node>()],
             skins: RefCell::default(),
         };
@@ -99,7 +103,8 @@ impl<'g, 's> Graph<'g, 's> {
         let placed = self.placements.values_mut().flatten().map(|placement| &mut placement.world);
         let cameras = self.cameras.iter_mut().map(|(_, _, world)| world);
         let worlds = self.worlds.iter_mut().flatten();
-        for world in placed.chain(cameras).chain(worlds) {
+        let portals = self.portals.iter_mut().map(|(_, world)| world);
+        for world in placed.chain(cameras).chain(portals).chain(worlds) {
             *world = DMat4::from_translation(-offset) * *world;
         }
         self.skins.borrow_mut().clear();
@@ -154,7 +159,9 @@ impl<'g, 's> Graph<'g, 's> {
         if !is_visible {
             return Ok(());
         }
-        if let Some(mesh) = node.mesh {
+        if let Some(mesh) = node.mesh.filter(|_| node.extras.portal) {
+            self.portals.push((mesh, world));
+        } else if let Some(mesh) = node.mesh {
             let weights = pose.and_then(|p| p.weights.clone()).or(node.weights);
             let weights = weights.unwrap_or_default();
             let instances = match &node.extensions.instancing {
@@ -175,6 +182,29 @@ impl<'g, 's> Graph<'g, 's> {
             self.node(child, world, depth + 1)?;
         }
         Ok(())
+    }
+
+    /// The portals: the boxes of the meshes, which are flat. What has no area is left out with a warning, unless the load
+    /// is strict.
+    pub(super) fn portals(&self) -> Result<Vec<Portal>, Failure> {
+        let mut portals = Vec::with_capacity(self.portals.len());
+        for (index, world) in &self.portals {
+            let mesh: json::Mesh = self.source.document.get(*index)?;
+            for corners in mesh.primitives.iter().filter_map(|primitive| self.box_of(primitive)) {
+                match rectangle(&corners.map(|corner| world.transform_point3(corner))) {
+                    Some(portal) => portals.push(portal),
+                    None if self.source.strict => {
+                        let problem = GltfErrorKind::Portal;
+                        return Err(problem.within(format!("mesh {index}")).into());
+                    }
+                    None => {
+                        let text = "a portal without an area is left out";
+                        self.source.warn(&format!("mesh {index}: {text}"));
+                    }
+                }
+            }
+        }
+        Ok(portals)
     }
 
     /// The cameras, each of which may have the name of its node. An unusable camera is left out with a warning, unless
@@ -233,6 +263,15 @@ impl<'g, 's> Graph<'g, 's> {
         }
         Ok(joints)
     }
+}
+
+/// The rectangle halfway through a flat box, of which corner i is at the far end of the axes whose bits are set in i.
+fn rectangle(corners: &[DVec3; 8]) -> Option<Portal> {
+    let mut edges = [4, 2, 1].map(|i: usize| corners[i] - corners[0]);
+    edges.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
+    let [first, second, thickness] = edges;
+    let corner = corners[0] + 0.5 * thickness;
+    Portal::new(corner.as_vec3(), [first, second].map(|edge| edge.as_vec3())).ok()
 }
 
 /// A node's local matrix; animated properties replace those of the file.

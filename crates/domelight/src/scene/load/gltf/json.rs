@@ -312,6 +312,27 @@ pub(super) struct Node {
     pub(super) camera: Option<usize>,
     pub(super) weights: Option<Vec<f32>>,
     pub(super) extensions: NodeExtensions,
+    pub(super) extras: NodeExtras,
+}
+
+/// What authors write on nodes for us. Extras may be anything.
+#[derive(Debug, Default)]
+pub(super) struct NodeExtras {
+    /// Whether the node's mesh is a rectangle through which light enters.
+    pub(super) portal: bool,
+}
+
+impl<'de> Deserialize<'de> for NodeExtras {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let extras = Value::deserialize(deserializer)?;
+        let portal = match extras.get("portal") {
+            Some(Value::Bool(portal)) => *portal,
+            // Blender writes custom properties as numbers.
+            Some(Value::Number(number)) => number.as_f64() != Some(0.0),
+            _ => false,
+        };
+        Ok(Self { portal })
+    }
 }
 
 #[derive(Debug, Default, Deserialize)]

@@ -90,6 +90,7 @@ fn read(
     }
     let (materials, textures) = materials.finish(|text| source.warn(text));
     let cameras = graph.cameras()?;
+    let portals = graph.portals()?;
     let description = SceneDescription {
         parts,
         instances,
@@ -97,6 +98,7 @@ fn read(
         textures,
         camera: cameras.first().map(|camera| camera.settings),
         cameras,
+        portals,
         up: Some(UpAxis::Y),
         offset: graph.offset,
         ..SceneDescription::default()
