@@ -90,7 +90,7 @@ impl Allocation {
     ) {
         /// For pictures as bright as the light; darker ones have the square of their mean.
         const FLOOR: f64 = 0.01;
-        self.floor = brightness.map_or(FLOOR, |mean| FLOOR.min(f64::from(mean).powi(2)));
+        self.floor = brightness.map_or(FLOOR, |mean| FLOOR.min(f64::from(mean) * f64::from(mean)));
         self.width = width;
         self.n_samples = n_samples;
         self.mean_log = mean_log;

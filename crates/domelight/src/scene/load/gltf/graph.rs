@@ -271,7 +271,7 @@ fn rectangle(corners: &[DVec3; 8]) -> Option<Portal> {
     edges.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
     let [first, second, thickness] = edges;
     let corner = corners[0] + 0.5 * thickness;
-    Portal::new(corner.as_vec3(), [first, second].map(|edge| edge.as_vec3())).ok()
+    Portal::new(corner.as_vec3(), [first.as_vec3(), second.as_vec3()]).ok()
 }
 
 /// A node's local matrix; animated properties replace those of the file.
