@@ -10,7 +10,8 @@ use domelight::render::visibility;
 use domelight::sampling::{Sampler, SamplerKind};
 use domelight::scene::{Camera, Scene};
 use domelight::strategy::{
-    Estimator, PixelPoints, PreparedStrategy, ShadingPoint, Strategy, StrategySpec, TileShading,
+    Estimator, PixelPoints, Portal, PreparedStrategy, ShadingPoint, Strategy, StrategySpec,
+    TileShading,
 };
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
@@ -194,8 +195,8 @@ impl RayCounts {
 fn shadow_rays(
     at: &ShadingPoint,
     strategy: &PreparedStrategy<'_>,
-    n: u32,
-    seed: u64,
+    portals: &[Portal],
+    (n, seed): (u32, u64),
     visible: impl Fn(&[Vec3]) -> Vec<f32>,
     mut found: impl FnMut(Vec3, Rgb, f32),
 ) {
@@ -203,7 +204,7 @@ fn shadow_rays(
     let samples: Vec<u32> = (0..n).collect();
     let sampler = Sampler::new(SamplerKind::default(), seed, 0);
     let pixels = [PixelPoints::new(0..n as usize, n, sampler)];
-    let tile = TileShading { points: &points, samples: &samples, pixels: &pixels, width: 1 };
+    let tile = TileShading { portals, ..TileShading::new(&points, &samples, &pixels, 1) };
     let pass = strategy.begin_pass(Sampler::for_pass(SamplerKind::default(), seed, 0), n);
     Estimator::new(strategy).estimate(&pass, &tile, |rays, visibility| {
         visibility.copy_from_slice(&visible(&rays.wi));
@@ -452,7 +453,8 @@ impl Engine {
         let visible = |wi: &[Vec3]| picked.visibility(wi);
         for seed in 0..REPLICATES {
             let count = |wi, _, _| counts.add(wi);
-            shadow_rays(&picked.at, &strategy, SAMPLES, seed, visible, count);
+            let portals = picked.scene.portals();
+            shadow_rays(&picked.at, &strategy, portals, (SAMPLES, seed), visible, count);
         }
         let texels = Texels::new(mapping, width, environment.orientation().up);
         let view = texels.layers(|wi| [counts.density(wi)]);
@@ -503,7 +505,8 @@ impl Engine {
         let from_world = self.environment()?.orientation().up.from_y_up().transpose();
         let visible = |wi: &[Vec3]| picked.visibility(wi);
         let mut out = Vec::new();
-        shadow_rays(&picked.at, &strategy, n, seed.into(), visible, |wi, weight, v| {
+        let portals = picked.scene.portals();
+        shadow_rays(&picked.at, &strategy, portals, (n, seed.into()), visible, |wi, weight, v| {
             let uv = mapping.uv(from_world * wi);
             out.extend([uv.x, uv.y, weight.luminance(), v]);
         });
