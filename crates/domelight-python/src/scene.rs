@@ -11,8 +11,8 @@ use domelight::math::{DVec3, Vec2, Vec3};
 use domelight::picture::MAX_TEXELS;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
-    self, AnimationTime, CameraSettings, EnvironmentSettings, EnvironmentSource, Framing,
-    LoadOptions, Material, NamedCamera, Part, Projection, SceneDescription,
+    self, AnimationTime, CameraError, CameraSettings, EnvironmentSettings, EnvironmentSource,
+    Framing, Lens, LoadOptions, Material, NamedCamera, Part, Projection, SceneDescription,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -39,6 +39,15 @@ use crate::lobe::PythonLobe;
 ///     Vertical field of view of a perspective camera, in (0, 180) [degrees].
 /// ortho : float, optional
 ///     Height of an orthographic camera's picture in world units, positive.
+/// shift : (float, float), default (0, 0)
+///     Moves the picture across the image plane, to the right in widths of the picture and up in heights of it, as a
+///     view camera does; verticals stay parallel.
+/// aperture : float, optional
+///     Radius of a thin lens in world units, ≥ 0; perspective cameras only.
+/// focus_distance : float, optional
+///     Distance along the axis at which the lens is sharp, positive; required with `aperture`.
+/// blades : int, default 0
+///     Number of aperture blades; fewer than 3 mean a round aperture.
 #[pyclass(frozen, from_py_object, module = "domelight")]
 #[derive(Clone)]
 pub(crate) struct Camera {
@@ -46,9 +55,27 @@ pub(crate) struct Camera {
     target: Option<Vec3>,
     up: Option<Vec3>,
     projection: Option<Projection>,
+    shift: [f32; 2],
+    lens: Option<Lens>,
 }
 
 impl Camera {
+    /// The camera with the shift and the lens.
+    fn through_lens(
+        &self,
+        camera: scene::Camera,
+        settings: &CameraSettings,
+        (width, height): (usize, usize),
+    ) -> Result<scene::Camera, CameraError> {
+        let [right, up] = self.shift;
+        let camera = camera.shifted(right * width as f32, -up * height as f32);
+        match (self.lens, settings.projection) {
+            (None, _) => Ok(camera),
+            (Some(lens), Projection::Perspective { .. }) => Ok(camera.with_lens(lens)),
+            (Some(_), Projection::Orthographic { .. }) => Err(CameraError::NoLens),
+        }
+    }
+
     fn settings(&self, mut of_scene: CameraSettings) -> CameraSettings {
         of_scene.origin = self.origin.unwrap_or(of_scene.origin);
         of_scene.target = self.target.unwrap_or(of_scene.target);
@@ -60,20 +87,26 @@ impl Camera {
     fn of(settings: CameraSettings) -> Self {
         let CameraSettings { projection, origin, target, up } = settings;
         let [origin, target, up] = [origin, target, up].map(Some);
-        Self { origin, target, up, projection: Some(projection) }
+        Self { origin, target, up, projection: Some(projection), shift: [0.0; 2], lens: None }
     }
 }
 
 #[pymethods]
 impl Camera {
     #[new]
-    #[pyo3(signature = (*, origin = None, target = None, up = None, fov = None, ortho = None))]
+    #[pyo3(signature = (*, origin = None, target = None, up = None, fov = None, ortho = None, shift = [0.0, 0.0],
+        aperture = None, focus_distance = None, blades = 0),
+        text_signature = "(*, origin=None, target=None, up=None, fov=None, ortho=None, shift=(0.0, 0.0), aperture=None, focus_distance=None, blades=0)")]
     fn new(
         origin: Option<Bound<'_, PyAny>>,
         target: Option<Bound<'_, PyAny>>,
         up: Option<Bound<'_, PyAny>>,
         fov: Option<f32>,
         ortho: Option<f32>,
+        shift: [f32; 2],
+        aperture: Option<f32>,
+        focus_distance: Option<f32>,
+        blades: u32,
     ) -> PyResult<Self> {
         let projection = match (fov, ortho) {
             (Some(_), Some(_)) => return Err(bad_value("give fov or ortho, not both")),
@@ -85,7 +118,12 @@ impl Camera {
             |name, value: Option<Bound<'_, PyAny>>| value.map(|v| vector(name, &v)).transpose();
         let (origin, target, up) =
             (read("origin", origin)?, read("target", target)?, read("up", up)?);
-        Ok(Self { origin, target, up, projection })
+        if !shift.iter().all(|s| s.is_finite()) {
+            let [x, y] = shift;
+            return Err(bad_value(format!("shift is ({x}, {y}); it must be two finite numbers")));
+        }
+        let lens = lens(aperture, focus_distance, blades)?;
+        Ok(Self { origin, target, up, projection, shift, lens })
     }
 
     /// ndarray, shape (3,), or None: position of the camera.
@@ -124,6 +162,30 @@ impl Camera {
         }
     }
 
+    /// (float, float): shift of the picture to the right, in widths, and up, in heights.
+    #[getter]
+    fn shift(&self) -> (f32, f32) {
+        self.shift.into()
+    }
+
+    /// float or None: radius of the lens in world units.
+    #[getter]
+    fn aperture(&self) -> Option<f32> {
+        self.lens.map(|lens| lens.radius)
+    }
+
+    /// float or None: distance along the axis at which the lens is sharp.
+    #[getter]
+    fn focus_distance(&self) -> Option<f32> {
+        self.lens.map(|lens| lens.focus_distance)
+    }
+
+    /// int: number of aperture blades.
+    #[getter]
+    fn blades(&self) -> u32 {
+        self.lens.map_or(0, |lens| lens.blades)
+    }
+
     fn __repr__(&self) -> String {
         let vector =
             |name: &str, v: Option<Vec3>| v.map(|v| format!("{name}=({}, {}, {})", v.x, v.y, v.z));
@@ -136,9 +198,35 @@ impl Camera {
             vector("target", self.target),
             vector("up", self.up),
             projection,
+            (self.shift != [0.0; 2])
+                .then(|| format!("shift=({}, {})", self.shift[0], self.shift[1])),
+            self.lens.map(|Lens { radius, focus_distance, blades }| {
+                format!("aperture={radius}, focus_distance={focus_distance}, blades={blades}")
+            }),
         ];
         format!("Camera({})", parts.into_iter().flatten().collect::<Vec<_>>().join(", "))
     }
+}
+
+/// The lens of an aperture and a focus distance.
+fn lens(aperture: Option<f32>, focus_distance: Option<f32>, blades: u32) -> PyResult<Option<Lens>> {
+    let Some(radius) = aperture else {
+        return match focus_distance {
+            None => Ok(None),
+            Some(_) => Err(bad_value("focus_distance needs an aperture")),
+        };
+    };
+    let focus_distance =
+        focus_distance.ok_or_else(|| bad_value("aperture needs a focus_distance"))?;
+    if !(radius >= 0.0 && radius.is_finite()) {
+        return Err(bad_value(format!("aperture is {radius}; it must be finite and not negative")));
+    }
+    if !(focus_distance > 0.0 && focus_distance.is_finite()) {
+        return Err(bad_value(format!(
+            "focus_distance is {focus_distance}; it must be positive and finite"
+        )));
+    }
+    Ok(Some(Lens { radius, focus_distance, blades }))
 }
 
 fn from_vector(py: Python<'_>, v: Option<Vec3>) -> PyResult<Option<Bound<'_, PyArrayDyn<f32>>>> {
@@ -178,8 +266,14 @@ impl SceneData {
     ) -> PyResult<(scene::Camera, CameraSettings)> {
         let aspect = width as f32 / height as f32;
         let settings = self.camera_settings(camera, aspect, up)?;
-        let camera = scene::Camera::new(&settings, width, height).map_err(to_python)?;
-        Ok((camera, settings))
+        let pinhole = scene::Camera::new(&settings, width, height).map_err(to_python)?;
+        let seen = match camera {
+            Some(CameraLike::Camera(camera)) => {
+                camera.through_lens(pinhole, &settings, (width, height)).map_err(to_python)?
+            }
+            None | Some(CameraLike::Number(_) | CameraLike::Name(_)) => pinhole,
+        };
+        Ok((seen, settings))
     }
 
     fn camera_settings(

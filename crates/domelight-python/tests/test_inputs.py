@@ -41,6 +41,7 @@ FUNCTIONS = [
     lambda a, b: dl.Scene(a, b),
     lambda a, b: dl.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], normals=a, colors=b),
     lambda a, b: dl.Camera(origin=a, target=b),
+    lambda a, b: dl.Camera(shift=a, aperture=b, focus_distance=1),
     lambda a, b: dl.metrics.compare(a, b),
     lambda a, b: dl.metrics.flip(a, b),
     lambda a, b: dl.tone_map(a, exposure=b),

@@ -215,6 +215,7 @@ def test_cameras(sphere, env):
         (dl.Camera(origin=(0, 0, 0), target=(0, 0, 0)), "same point"),
         (dl.Camera(up=(0, 0, 0)), "up"),
         (dl.Camera(origin=(0, np.nan, 0)), "origin"),
+        (dl.Camera(ortho=2, aperture=0.1, focus_distance=3), "no lens"),
         (7, "no camera 7"),
         ("front", 'no camera "front"'),
     ]:
@@ -224,6 +225,40 @@ def test_cameras(sphere, env):
         dl.Camera(fov=30, ortho=2)
     with pytest.raises(ValueError, match=r"origin has shape \(2,\)"):
         dl.Camera(origin=(0, 1))
+
+
+def test_a_shifted_camera_sees_a_window_of_the_same_image_plane(sphere, env):
+    common = {"origin": (0, 0, 4), "target": (0, 0, 0), "up": (0, 1, 0)}
+    wide = {"filter": "box", "spp": 256, "seed": 1}
+    whole = dl.render(sphere, env, camera=dl.Camera(**common, ortho=4), size=(64, 64), **wide)
+    # The right upper quarter: its middle is half of its size away.
+    quarter = dl.Camera(**common, ortho=2, shift=(0.5, 0.5))
+    part = dl.render(sphere, env, camera=quarter, size=(32, 32), **wide)
+    expected = whole.alpha[:32, 32:]
+    assert abs(part.alpha.mean() - expected.mean()) < 0.01 and 0 < expected.mean() < 1
+    assert quarter.shift == (0.5, 0.5) and "shift=(0.5, 0.5)" in repr(quarter)
+
+
+def test_a_lens_blurs_what_is_out_of_focus(sphere, env):
+    common = {"origin": (0, 0, 4), "target": (0, 0, 0), "up": (0, 1, 0), "fov": 40}
+    common_settings = {"size": (48, 48), "spp": 64, "filter": "box", "hide_env": True}
+    pinhole = dl.render(sphere, env, camera=dl.Camera(**common), **common_settings).alpha
+    closed = dl.Camera(**common, aperture=0, focus_distance=3)
+    assert np.array_equal(dl.render(sphere, env, camera=closed, **common_settings).alpha, pinhole)
+    lens = dl.Camera(**common, aperture=0.3, focus_distance=1.5, blades=6)
+    assert (lens.aperture, lens.focus_distance, lens.blades) == (np.float32(0.3), 1.5, 6)
+    blurred = dl.render(sphere, env, camera=lens, **common_settings).alpha
+    partial = lambda alpha: ((alpha > 0.05) & (alpha < 0.95)).sum()
+    assert partial(blurred) > 3 * partial(pinhole)
+    for wrong, words in [
+        ({"aperture": 0.1}, "focus_distance"),
+        ({"focus_distance": 1}, "aperture"),
+        ({"aperture": -1, "focus_distance": 1}, "aperture is -1"),
+        ({"aperture": 1, "focus_distance": 0}, "focus_distance is 0"),
+        ({"shift": (np.nan, 0)}, "shift"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            dl.Camera(**wrong)
 
 
 @pytest.mark.parametrize(

@@ -302,6 +302,18 @@ impl Camera {
         self
     }
 
+    /// Moves the picture across the image plane, to the right and down in pixels; the axis and the focal plane stay.
+    #[must_use]
+    pub fn shifted(mut self, right: f32, down: f32) -> Self {
+        let shift = right * self.step_x + down * self.step_y;
+        if self.orthographic {
+            self.origin += shift;
+        } else {
+            self.direction += shift;
+        }
+        self
+    }
+
     /// Whether rays depend on a point on the lens.
     #[inline]
     pub fn has_lens(&self) -> bool {
@@ -479,6 +491,23 @@ mod tests {
         assert!((camera.ray(10.0, 5.0).origin - s.origin).length() < 1e-6);
         let width = (camera.ray(0.0, 5.0).origin - camera.ray(20.0, 5.0).origin).length();
         assert!((width - 6.0).abs() < 1e-5);
+    }
+
+    /// A shifted picture is a window of the same image plane.
+    #[test]
+    fn a_shift_moves_the_window() {
+        let flat =
+            CameraSettings { projection: Projection::Orthographic { height: 3.0 }, ..settings() };
+        for s in [settings(), flat] {
+            let camera = Camera::new(&s, 30, 20).unwrap();
+            let shifted = camera.shifted(6.5, -4.0);
+            for (px, py) in [(0.0, 0.0), (12.5, 7.25), (30.0, 20.0)] {
+                let (ray, expected) = (shifted.ray(px, py), camera.ray(px + 6.5, py - 4.0));
+                assert!((ray.direction - expected.direction).length() < 1e-6);
+                assert!((ray.origin - expected.origin).length() < 1e-5);
+            }
+            assert_eq!(shifted.depth(Vec3::ONE), camera.depth(Vec3::ONE));
+        }
     }
 
     /// Rays through one point of the picture meet at the focus distance, and start all over the aperture.
