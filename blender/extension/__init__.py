@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The domelight developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""domelight in Blender: a light rig from the world's HDRI."""
+"""domelight in Blender: a light rig from the world's HDRI, and a render engine."""
 
-from . import light_rig, light_rig_ui
+from . import engine, light_rig, light_rig_ui
 
-MODULES = (light_rig, light_rig_ui)
+MODULES = (light_rig, light_rig_ui, engine)
 
 
 def register():

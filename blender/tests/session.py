@@ -4,6 +4,7 @@
 
 import os
 import sys
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -133,8 +134,8 @@ def white_ball():
     return ball
 
 
-def render(folder, engine="CYCLES", size=(48, 48), samples=256, transparent=True):
-    """The scene as linear values (height, width, 4), by direct light alone."""
+def render(folder, engine="CYCLES", size=(48, 48), samples=256, transparent=True, cropped=None):
+    """The scene as linear values (height, width, 4), by direct light alone; `cropped` is the size of a region."""
     scene = bpy.context.scene
     settings = scene.render
     settings.engine = engine
@@ -153,10 +154,41 @@ def render(folder, engine="CYCLES", size=(48, 48), samples=256, transparent=True
     settings.filepath = str(folder / f"{engine.lower()}.exr")
     assert bpy.ops.render.render(write_still=True) == {"FINISHED"}
     picture = bpy.data.images.load(settings.filepath)
-    width, height = size
+    width, height = cropped or size
     pixels = np.array(picture.pixels[:], np.float32).reshape(height, width, 4)[::-1]
     bpy.data.images.remove(picture)
     return pixels
+
+
+def passes(engine, size):
+    """The passes of a render, by name, as the engine hands them over: (height, width, channels)."""
+    module = extension("engine")
+    found = {}
+    hand_over = module.hand_over
+
+    def kept(result, name, values):
+        found[name] = np.array(values)
+        hand_over(result, name, values)
+
+    module.hand_over = kept
+    try:
+        render(Path(bpy.app.tempdir), engine, size)
+    finally:
+        module.hand_over = hand_over
+    return found
+
+
+def keep(name, expected, found):
+    """Write two pictures and their difference, ten times, into $DOMELIGHT_PICTURES if it is set."""
+    folder = os.environ.get("DOMELIGHT_PICTURES")
+    if folder is None:
+        return
+    difference = 0.5 + 10 * (found - expected) / (2 * expected[..., :3].mean())
+    rows = [np.clip(p[..., :3], 0, 1) ** (1 / 2.2) for p in (expected, found)] + [np.clip(difference[..., :3], 0, 1)]
+    sheet = np.concatenate(rows, axis=1)
+    scaled = np.repeat(np.repeat(sheet, 4, axis=0), 4, axis=1)
+    gltf = extension("gltf")
+    (Path(folder) / f"{name}.png").write_bytes(gltf.png(gltf.texels_of(scaled, 8)))
 
 
 def contents():
