@@ -12,6 +12,7 @@ mod command_line;
 mod compare;
 mod conventions;
 mod diff;
+mod doctor;
 mod error;
 mod exit;
 mod farm;
@@ -66,6 +67,7 @@ fn main() -> ExitCode {
         Command::Tables(arguments) => tables::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
         Command::Conventions(arguments) => conventions::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Schema => output::print_json(&domelight_lab::job::schema()),
         Command::Tone(arguments) => tone::run(&arguments, quiet),
         Command::Figures(arguments) => figures::run(&arguments, quiet),

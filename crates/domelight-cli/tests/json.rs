@@ -78,6 +78,7 @@ const RUNS: [(&str, &[&str]); 16] = [
     ("probe", &["sky", "--size", "32"]),
     ("figures", &["--quick", "--env-rows", "24", "--scene", "sphere", "--only", "1"]),
     ("conventions", &[]),
+    ("doctor", &[]),
     ("completions", &["bash"]),
     ("man", &["pages"]),
 ];

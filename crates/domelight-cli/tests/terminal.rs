@@ -37,6 +37,31 @@ fn a_misspelled_name_is_answered_by_the_one_that_was_meant() {
 }
 
 #[test]
+fn a_report_of_a_problem_says_what_runs_where() {
+    let folder = folder();
+    let path = folder.path().join("bin");
+    fs::create_dir(&path).unwrap();
+    let run = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_domelight"));
+        command.arg("doctor").env("PATH", &path).env("OIDN_LIBRARY", "nothing-of-this-name");
+        command.output().expect("the program starts")
+    };
+    let output = run();
+    let text = done(&output);
+    assert!(text.starts_with(concat!("domelight ", env!("CARGO_PKG_VERSION"), "\n")), "{text}");
+    for line in ["threads       ", "memory limit  ", "cache         ", "denoiser      no denoiser"]
+    {
+        assert!(text.contains(&format!("\n{line}")), "{text}");
+    }
+    assert!(text.contains("\nBlender       no program"), "{text}");
+    let program = path.join(format!("blender{}", std::env::consts::EXE_SUFFIX));
+    fs::write(&program, "").unwrap();
+    assert!(done(&run()).contains(&format!("\nBlender       {}\n", program.display())));
+    let report = json(&domelight(&folder, &["doctor", "--json"]));
+    assert!(report["instruction_sets"].as_array().unwrap().contains(&"scalar".into()), "{report}");
+}
+
+#[test]
 fn each_shell_gets_a_script_that_knows_commands_and_options() {
     let folder = folder();
     for shell in SHELLS {

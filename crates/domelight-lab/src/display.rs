@@ -17,6 +17,15 @@ use domelight::render::{Layers, TileView, Window};
 /// Where viewers listen.
 pub const ADDRESS: &str = "127.0.0.1:14158";
 
+/// How long [`is_listening`] waits.
+const MOMENT: Duration = Duration::from_millis(300);
+
+/// Whether a viewer accepts connections at an address.
+pub fn is_listening(address: &str) -> bool {
+    let found = address.to_socket_addrs().ok().and_then(|mut all| all.next());
+    found.is_some_and(|address| TcpStream::connect_timeout(&address, MOMENT).is_ok())
+}
+
 /// How long a viewer may take to accept a connection, or to read anything.
 const PATIENCE: Duration = Duration::from_secs(3);
 

@@ -134,6 +134,9 @@ pub(crate) enum Command {
     /// List how other programs orient a lat-long map, or write a map that shows it.
     #[command(after_help = CONVENTIONS_EXAMPLES)]
     Conventions(ConventionsArguments),
+    /// Print what a report of a problem should say: version, processor, threads, memory, cache, optional parts.
+    #[command(after_help = DOCTOR_EXAMPLES)]
+    Doctor(DoctorArguments),
     /// Print the JSON Schema of jobs: of scene files that say how to render, and of what a picture says of itself.
     #[command(after_help = SCHEMA_EXAMPLES)]
     Schema,
@@ -167,6 +170,20 @@ pub(crate) struct ConventionsArguments {
     #[arg(long, value_name = "H", default_value = "512", requires = "output")]
     pub(crate) size: Count<16, 8192>,
     /// Print the list as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+const DOCTOR_EXAMPLES: &str = "\
+Examples:
+  domelight doctor
+      to paste into a report
+  domelight doctor --json | jq .denoiser";
+
+/// Print what a report of a problem should say.
+#[derive(Args, Debug)]
+pub(crate) struct DoctorArguments {
+    /// Print it as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }

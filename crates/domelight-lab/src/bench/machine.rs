@@ -10,26 +10,29 @@ const RUSTFLAGS: &str = env!("DOMELIGHT_RUSTFLAGS");
 
 /// The computer and the build of this program.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Machine {
-    /// Null where the system does not report it.
-    cpu: Option<String>,
+pub struct Machine {
+    /// The processor; null where the system does not report it.
+    pub cpu: Option<String>,
     /// Cores that the process may use.
-    cores: usize,
+    pub cores: usize,
     /// The one that the ray kernel runs with.
-    instruction_set: String,
-    target: String,
-    rustc: String,
+    pub instruction_set: String,
+    /// What the program was built for.
+    pub target: String,
+    /// The compiler.
+    pub rustc: String,
     /// Release or debug.
-    profile: String,
+    pub profile: String,
     /// Flags beside those of the profile.
-    rustflags: String,
+    pub rustflags: String,
     /// Processes that wanted to run in the last minute, before the first measurement; null where the system
     /// does not report it. Above 0, other programs ran beside the bench.
-    load_average: Option<f64>,
+    pub load_average: Option<f64>,
 }
 
 impl Machine {
-    pub(super) fn this() -> Self {
+    /// This computer and this build.
+    pub fn this() -> Self {
         Self {
             cpu: cpu(),
             cores: std::thread::available_parallelism().map_or(1, Into::into),

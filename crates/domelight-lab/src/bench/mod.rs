@@ -16,6 +16,7 @@ mod table;
 
 use std::path::PathBuf;
 
+pub use machine::Machine;
 pub use results::Results;
 pub use table::Table;
 

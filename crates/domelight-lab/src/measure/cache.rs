@@ -25,15 +25,18 @@ impl Cache {
     /// The requested folder, or else that of the platform; `None` with a warning if there is none. `program` is the fingerprint
     /// of the renderer, because another build may make other pictures.
     pub fn new(folder: Option<&Path>, program: &str, host: &dyn Host) -> Option<Self> {
-        let folder = folder
-            .map(Path::to_path_buf)
-            .or_else(|| Some(choose_native_strategy().ok()?.cache_dir().join("domelight")));
+        let folder = folder.map(Path::to_path_buf).or_else(Self::user_folder);
         if folder.is_none() {
             host.warn(
                 "there is no home folder for the cache of references; name one with --cache FOLDER",
             );
         }
         Some(Self { folder: folder?, program: program.to_owned() })
+    }
+
+    /// The platform's folder for the user's references; `None` without a home folder.
+    pub fn user_folder() -> Option<PathBuf> {
+        Some(choose_native_strategy().ok()?.cache_dir().join("domelight"))
     }
 
     /// The entry and its bytes, if it exists and is valid. A damaged entry is removed.
