@@ -6,7 +6,7 @@ use std::fs;
 use tempfile::TempDir;
 
 /// Small runs of every command, in an order in which each finds the files of those before.
-const RUNS: [(&str, &[&str]); 16] = [
+const RUNS: [(&str, &[&str]); 17] = [
     (
         "render",
         &[
