@@ -212,6 +212,21 @@ fn estimate<S: Strategy>(strategy: &S, at: &ShadingPoint, n: usize, seed: u64) -
     sum.map(|sum| sum / (SIDE * SIDE * n) as f64)
 }
 
+/// Batches of 64 times the estimates, whose standard error is an eighth.
+fn long_batches<S: Strategy>(strategy: &S, at: &ShadingPoint, n: usize) -> Vec<[f64; 3]> {
+    const LENGTH: u64 = 64;
+    let mean = |batch: u64| {
+        let seeds = batch * LENGTH..(batch + 1) * LENGTH;
+        let mut sums = [0.0; 3];
+        for seed in seeds {
+            let of_seed = estimate(strategy, at, n, seed);
+            sums.iter_mut().zip(of_seed).for_each(|(sum, x)| *sum += x / LENGTH as f64);
+        }
+        sums
+    };
+    (0..32).map(mean).collect()
+}
+
 fn batches<S: Strategy>(strategy: &S, at: &ShadingPoint, n: usize, seed: u64) -> Vec<[f64; 3]> {
     (0..32).map(|batch| estimate(strategy, at, n, seed + batch)).collect()
 }
@@ -240,7 +255,12 @@ fn no_value_is_beyond_any_strategy() {
                     && needed_width.is_none_or(|needed| needed == width)
                     && needed_light.is_none_or(|needed| needed == *light);
                 if is_tested {
-                    test.two_sample(&label, &batches, &reference).unwrap_or_else(|f| panic!("{f}"));
+                    // Narrow lobes beside a sun hang on events that few of these batches have: more must agree.
+                    if test.two_sample(&label, &batches, &reference).is_err() {
+                        let batches = long_batches(&prepare(strategy), &at, n);
+                        test.two_sample(&label, &batches, &reference)
+                            .unwrap_or_else(|f| panic!("{f}"));
+                    }
                 }
             }
             for rig in RIGS.iter().filter_map(|text| rig(text, env)) {

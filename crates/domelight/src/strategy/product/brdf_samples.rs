@@ -314,7 +314,11 @@ impl BrdfSampleBatch {
         let (le, f) = (Colors::load(simd, &found.le), Colors::load(simd, &self.f));
         let slots = simd.load_i32(&found.slots);
         let within = le.luminance() / S::F32x8::gather(&cells.mass, slots);
-        let density = simd.splat(strata) * table.products::<S::F32x8>(slots) * within
+        // Strata cannot reach cells that vanish in the running sum.
+        let zero = simd.splat(0.0);
+        let reached = zero.lt(table.widths::<S::F32x8>(slots));
+        let product = SimdFloat::select(reached, table.products::<S::F32x8>(slots), zero);
+        let density = simd.splat(strata) * product * within
             + simd.splat(n_brdf) * simd.load(&self.pdf)
             + simd.load(&self.portal_density);
         let value = f.zip(le, |f, le| f * le).scaled(simd.splat(1.0) / density);
