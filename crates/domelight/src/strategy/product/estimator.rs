@@ -74,8 +74,7 @@ impl TileEstimator<'_, '_> {
         let counts =
             self.strategy.counts(&self.scratch.groups, points.len(), self.pilots, has_portals);
         // Tabulate light times reflectance over the cells (Clarberg & Akenine-Möller 2008, section 3).
-        let position = points.iter().map(|p| p.position).sum::<Vec3>() / points.len() as f32;
-        self.tabulate_product(simd, block, counts, position);
+        self.tabulate_product(simd, block, counts, points);
         // Draw candidates from the table and from the BRDF, weighted by the balance heuristic (Veach 1997, eq. 9.8).
         let numbers = self.pixel_numbers(pixel);
         self.draw_candidates(simd, hits, counts, &numbers);
@@ -98,11 +97,16 @@ impl TileEstimator<'_, '_> {
     /// alone, because BRDF samples do not come from the pool from which visibility was learned.
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
-    fn tabulate_product<S: Simd>(&mut self, simd: S, block: usize, counts: Counts, position: Vec3) {
+    fn tabulate_product<S: Simd>(
+        &mut self,
+        simd: S,
+        block: usize,
+        counts: Counts,
+        points: &[ShadingPoint],
+    ) {
         let cells = self.cells;
         let ProductScratch { groups, table, control_variate, visibility, strata_share, .. } =
             &mut *self.scratch;
-        let portals = Portals::new(self.tile.portals);
         if self.pilots {
             table.fill::<S, false>(simd, cells, &groups.all, control_variate);
             table.keep_product(simd, cells);
@@ -113,7 +117,8 @@ impl TileEstimator<'_, '_> {
         table.keep_product(simd, cells);
         if counts.portal > 0 {
             let strata = counts.light as f32 / table.product_total().max(f32::MIN_POSITIVE);
-            let portals = (portals, counts.portal);
+            let portals = (Portals::new(self.tile.portals), counts.portal);
+            let position = points.iter().map(|p| p.position).sum::<Vec3>() / points.len() as f32;
             strata_share.fill(simd, cells, table, portals, strata, position);
             strata_share.apply(simd, cells, table, control_variate);
         }
