@@ -29,11 +29,15 @@ export async function launch() {
 }
 export const close = () => browser?.close();
 
+/** How much slower the page's main thread is made, to test what happens on a slow machine. */
+const throttling = Number(process.env.THROTTLE ?? 1);
+
 /** Opens the page; whatever goes wrong there, or reaches for the network, fails the test. */
 export async function open(hash = SMALL, { query = "", script, ready = "html[data-ready]", ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, acceptDownloads: true, ...options });
   const page = await context.newPage();
   if (script) await page.addInitScript(script);
+  if (throttling > 1) await (await context.newCDPSession(page)).send("Emulation.setCPUThrottlingRate", { rate: throttling });
   page.setDefaultTimeout(60_000);
   const complaints = [];
   page.on("console", (message) => {

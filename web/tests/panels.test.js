@@ -138,14 +138,17 @@ test("errors are measured at whole passes against a reference that is made by it
 });
 
 test("a biased strategy is measured with its bias, which its variance does not show", async () => {
-  const { page, done } = await open("size=64&spp=16&rows=64&strategy=median-cut:16");
+  // Four lights cannot stand for the many windows of a nave: the bias is fifty times the variance, which is that of the
+  // camera's samples alone. Under the sky, sixteen lights have as much of the one as of the other.
+  const { page, done } = await open("size=64&spp=16&rows=64&env=cathedral&strategy=median-cut:4");
   await rendered(page);
   await page.waitForSelector("figure[data-error=measured]");
+  await page.waitForFunction(() => { const { reference } = window.domelight.picture; return reference.isReady && !reference.running; });
   const [measured, estimated] = await page.evaluate(() => {
     const { picture } = window.domelight;
     return [picture.measured()[0].at(-1).error, picture.jobs[0].statistics.relativeVariance];
   });
-  assert.ok(measured > 2 * estimated, `measured ${measured}, estimated ${estimated}`);
+  assert.ok(measured > 20 * estimated, `measured ${measured}, estimated ${estimated}`);
   await done();
 });
 
@@ -498,7 +501,7 @@ test("the first step of the lecture plays, pauses, steps, is dragged and read", 
   await button("Step back").click();
   assert.equal(await samples(), paused - 1);
   const circles = (kind) => page.$$eval("#figure svg:nth-of-type(1)", ([svg], kind) => svg.querySelectorAll(`circle.${kind}[r]`).length, kind);
-  assert.equal(await circles("third"), paused - 1 + 1, "each sample is a dot, and the legend has one");
+  assert.equal(await circles("estimate"), paused - 1 + 1, "each sample is a dot, and the legend has one");
   // Over x = 0.9, f is 2.43; the pointer drags p through it.
   const svg = page.locator("#figure svg").first();
   await svg.scrollIntoViewIfNeeded();
@@ -526,7 +529,7 @@ test("the first step of the lecture plays, pauses, steps, is dragged and read", 
 /** Steps and the place in their first plot or map, as shares of it, where something can be dragged, and to where. */
 const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[0.45, 0.5], [0.35, 0.5]], 4: [[0.4, 0.4], [0.25, 0.6]], 5: [[0.6, 0.5], [0.4, 0.5]],
   6: [[0.5, 0.3], [0.5, 0.7]], 7: [[0.3, 0.3], [0.6, 0.5]], 8: [[0.6, 0.5], [0.8, 0.5]], 9: [[0.6, 0.5], [0.75, 0.5]], 10: [[0.5, 0.7], [0.5, 0.4]], 11: [[0.5, 0.5], [0.7, 0.5]],
-  13: [[0.4, 0.5], [0.6, 0.5]], 14: [[0.3, 0.3], [0.6, 0.6]], 15: [[0.3, 0.3], [0.6, 0.6]] };
+  13: [[0.4, 0.5], [0.6, 0.5]], 14: [[0.03, 0.3], [0.97, 0.6]], 15: [[0.16, 0.3], [0.66, 0.8]] };
 
 for (let step = 1; step <= 15; step++) {
   test(`the figure of step ${step} plays, pauses, is dragged and read`, async () => {
@@ -817,7 +820,9 @@ test("every material has controls for all that its text says", async () => {
   }
   // What the text says is on the controls.
   await renderedAnew(page, () => page.fill("#material", "ggx:0.2,0.1:0.9,0.5,0.1:correlated").then(() => page.keyboard.press("Enter")));
-  assert.deepEqual(await page.$$eval("#material-numbers :is(input, select)", (all) => all.map(({ value }) => value)), ["0.2", "0.5", "color", "#f3bc59", "correlated"]);
+  assert.deepEqual(await page.$$eval("#material-numbers :is(input, select)", (all) => all.map(({ value }) => value)), ["0.2", "0.5", "color", "#f3bc59", "correlated", "multiple"]);
+  await renderedAnew(page, () => page.fill("#material", "ggx:0.2:gold:single").then(() => page.keyboard.press("Enter")));
+  assert.equal(await page.$$eval("#material-numbers select", (all) => all.at(-1).value), "single");
   await done();
 });
 

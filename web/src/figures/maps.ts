@@ -100,6 +100,29 @@ function dot(context: CanvasRenderingContext2D, [u, v]: Point, radius: number, s
   context.stroke();
 }
 
+/** The place of a direction. */
+const placeOf = ([x, y, z]: Vector): Point => [(Math.atan2(z, x) / (2 * Math.PI) + 1) % 1, Math.acos(Math.min(Math.max(y, -1), 1)) / Math.PI];
+
+/** The rim of a cone about a place's direction. */
+function rim(context: CanvasRenderingContext2D, place: Point, angle: number) {
+  const axis = direction(place), [u, v] = place, [a, b] = [Math.PI * v, 2 * Math.PI * u];
+  const down: Vector = [Math.cos(a) * Math.cos(b), -Math.sin(a), Math.cos(a) * Math.sin(b)], across: Vector = [-Math.sin(b), 0, Math.cos(b)];
+  const [s, c] = [Math.sin(angle), Math.cos(angle)];
+  const points = Array.from({ length: 181 }, (_, k) => k * Math.PI / 90)
+    .map((t) => placeOf(axis.map((of, i) => c * of + s * (Math.cos(t) * down[i] + Math.sin(t) * across[i])) as Vector));
+  context.beginPath();
+  points.forEach(([x, y], k) => {
+    // The left and right edges of the map meet.
+    const isCut = k === 0 || Math.abs(x - points[k - 1][0]) > 0.5;
+    context[isCut ? "moveTo" : "lineTo"](WIDTH * x, HEIGHT * y);
+  });
+  for (const [width, style] of [[4, "#000"], [2, "#ffd34d"]] as const) {
+    context.lineWidth = width;
+    context.strokeStyle = style;
+    context.stroke();
+  }
+}
+
 /** Rows of the table of step 6. */
 const ROWS = 64;
 
@@ -137,8 +160,8 @@ export const rowsAndColumns = (stage: Stage) => {
   });
 };
 
-/** The radius of the window that is dragged over the map [cosine]. */
-const WINDOW = Math.cos(Math.PI / 12);
+/** The radius of the window that is dragged over the map. */
+const WINDOW = Math.PI / 12;
 
 export const environmentSamples = (stage: Stage) => {
   const n = stage.player("Samples", 0, 11, 7, (x) => String(2 ** x));
@@ -151,8 +174,9 @@ export const environmentSamples = (stage: Stage) => {
     const context = canvas(stage, "Environment samples");
     map.paint(context);
     const over = pointed(), middle = center ?? (over ? [over.x, over.y] as Point : null);
-    const isInside = (place: Point) => !!middle && cosine(direction(place), direction(middle)) > WINDOW;
+    const isInside = (place: Point) => !!middle && cosine(direction(place), direction(middle)) > Math.cos(WINDOW);
     for (const place of places) dot(context, place, 2.5, isInside(place) ? "#ffd34d" : "#fff");
+    if (middle) rim(context, middle, WINDOW);
     const inside = places.filter(isInside).length;
     const rows = COLUMNS / 2, share = map.share((i) => isInside([(i % COLUMNS + 0.5) / COLUMNS, (Math.floor(i / COLUMNS) + 0.5) / rows]));
     stage.read(middle && over ? `${map.read([over.x, over.y])}; ${inside} of ${count} samples (${short(100 * inside / count)} %) are within 15° of ${center ? "the window’s center" : "it"}, which holds ${short(100 * share)} % of the light.` : null);
