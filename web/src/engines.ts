@@ -141,8 +141,10 @@ export class Job {
     return this.ended;
   }
 
-  raysOf(host: Host): number {
-    return this.statisticsOf.get(host)?.shadowRays ?? 0;
+  /** An engine's shadow rays for one sample of each of its pixels; null before it has taken one. */
+  raysPerSample(host: Host): number | null {
+    const s = this.statisticsOf.get(host);
+    return s && (s.samples >= 1 || s.complete) ? s.shadowRays / Math.max(s.samples, 1) : null;
   }
 
   /** The picture at whole passes. */
@@ -304,12 +306,16 @@ export class Engines {
     return next;
   }
 
-  /** Stops one of the pictures at a number of shadow rays. */
-  endAt(job: Job, rays: number) {
-    if (job.budgeted) return;
+  /** Stops one of the pictures at a number of shadow rays, as soon as it is known how the engines share them, from this
+   *  render or one before; returns whether it is. */
+  endAt(job: Job, rays: number, known = job): boolean {
+    if (job.budgeted) return true;
+    const shares = job.hosts.map((host) => known.raysPerSample(host));
+    if (!shares.every((share) => share !== null)) return false;
     job.budgeted = true;
-    const now = job.statistics.shadowRays;
-    job.hosts.forEach((host) => host.send({ kind: "budget", token: job.token, rays: rays * job.raysOf(host) / Math.max(now, 1) }));
+    const all = Math.max(shares.reduce((sum, share) => sum + share, 0), 1e-9);
+    job.hosts.forEach((host, i) => host.send({ kind: "budget", token: job.token, rays: rays * shares[i] / all }));
+    return true;
   }
 
   /** Stops one of the pictures in its current state. */

@@ -271,17 +271,26 @@ export class PicturePanel {
     if (a.complete && b.complete) {
       // The estimate was too low: now the number of rays per sample is known.
       if (b.isWhole && rays[1] < 0.98 * rays[0]) this.replaceRight(b.settings.spp * rays[0] / Math.max(rays[1], 1));
+      // A busy page has heard too late that the left picture is done: the right one starts anew, and knows its end.
+      else if (!b.budgeted && b.settings.spp > 1 && rays[1] > 1.02 * rays[0]) {
+        this.replaceRight(b.settings.spp, 1);
+        engines.endAt(this.jobs[1], rays[0], b);
+      }
       return;
     }
-    if (a.complete) return engines.endAt(b, rays[0]);
+    if (a.complete) {
+      // Where the left picture ends first, the right one may not have begun.
+      if (!engines.endAt(b, rays[0])) engines.pause(b, false);
+      return;
+    }
     engines.pause(a, rays[0] > 1.02 * Math.max(1, rays[1]) + 20_000);
     engines.pause(b, rays[1] > rays[0]);
   }
 
-  /** Starts the right picture anew for a number of samples, and some to spare. */
-  private replaceRight(spp: number) {
-    const { engines } = this.app, b = this.jobs[1], spare = Math.min(Math.max(1, Math.ceil(SPARE * spp)), 65536);
-    if (spare === b.settings.spp) return;
+  /** Starts the right picture anew for a number of samples, and some to spare, unless it has them. */
+  private replaceRight(spp: number, reserve = SPARE) {
+    const { engines } = this.app, b = this.jobs[1], spare = Math.min(Math.max(1, Math.ceil(reserve * spp)), 65536);
+    if (spare === b.settings.spp && reserve > 1) return;
     this.jobs[1] = engines.again(b, { spp: spare });
     this.histories[1] = [];
     engines.pause(this.jobs[0], false);
