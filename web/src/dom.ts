@@ -52,8 +52,9 @@ export const percentage = (share: number) => (share !== 0 && Math.abs(share) < 5
 /** A signed number with a true minus sign. */
 export const signed = (x: number, digits = 2) => x.toFixed(digits).replace("-", "−");
 
-/** Runs at most one task at a time; afterwards runs only the last of the tasks requested meanwhile. */
-export function latest<A extends unknown[]>(task: (...args: A) => Promise<void>): (...args: A) => void {
+/** Runs at most one task at a time; afterwards runs only the last of the tasks requested meanwhile, and calls `done` when
+ *  there are no more. */
+export function latest<A extends unknown[]>(task: (...args: A) => Promise<void>, done = () => {}): (...args: A) => void {
   let running = false;
   let next: A | null = null;
   const run = async (args: A) => {
@@ -64,7 +65,7 @@ export function latest<A extends unknown[]>(task: (...args: A) => Promise<void>)
         const again = next;
         next = null;
         void run(again);
-      }
+      } else done();
     }
   };
   return (...args) => {

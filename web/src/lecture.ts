@@ -101,7 +101,9 @@ export class Lecture {
     this.stage = this.app.probe ? new Stage(figure, this.app, this.app.state.figure.split(";"), answer) : null;
     if (this.stage) FIGURES[i](this.stage);
     document.documentElement.dataset.step = String(i + 1);
-    if (this.app.embeds && this.stage) document.documentElement.dataset.ready = "true";
+    if (!this.stage) return;
+    document.documentElement.dataset.ready = "true";
+    this.app.progress("");
   }
 }
 

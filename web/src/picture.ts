@@ -76,6 +76,7 @@ export class PicturePanel {
   private changed(what: Change) {
     if (what === "all" || what === "files") this.fillControls();
     if (what === "scene" || what === "camera") this.fillCameras();
+    if (what === "panel" && this.postponed) this.render(true);
     if (what === "files" || what === "panel") return;
     if (what === "pixel" || what === "view") {
       this.showView();
@@ -86,10 +87,18 @@ export class PicturePanel {
     const { panel, step, figure, pixel, compared, exposure, curve, view, mapping, layer, samples, method, refine, lights, sun, lamps, leave, gloss, ...rendered } = this.app.state;
     const key = JSON.stringify(rendered);
     // A changed hash may concern only another panel.
-    if (what === "all" && key === this.renderedKey) return;
+    if (what === "all" && key === this.renderedKey && !this.postponed) return;
     this.renderedKey = key;
-    // Another page that shows a step needs no picture.
-    if (!this.app.embeds) void this.restart(what !== "render");
+    this.render(what !== "render");
+  }
+
+  /** Whether the picture waits for a panel that shows it. */
+  private postponed = false;
+
+  /** Renders the picture. The lecture's figures do not share the computer with a picture that nobody sees. */
+  private render(atOnce: boolean) {
+    this.postponed = this.app.embeds || this.app.state.panel === "lecture";
+    if (!this.postponed) void this.restart(atOnce);
   }
 
   // ---- rendering

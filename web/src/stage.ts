@@ -95,7 +95,12 @@ export class Stage {
   readonly firstDrawn = new Promise<void>((done) => { this.drawn = done; });
   private drawNow: () => void | Promise<void> = () => {};
   private isDrawing = false;
-  readonly redraw = latest(async () => {
+  /** Draws; while it draws, only the last of other requests waits. */
+  redraw() {
+    this.place.dataset.drawing = "";
+    this.drawLatest();
+  }
+  private readonly drawLatest = latest(async () => {
     this.isDrawing = true;
     try {
       await this.drawNow();
@@ -105,7 +110,7 @@ export class Stage {
     this.isDrawing = false;
     this.drawn();
     this.place.dataset.drawn = String(Number(this.place.dataset.drawn ?? 0) + 1);
-  });
+  }, () => { delete this.place.dataset.drawing; });
 
   /** Draws now, and whenever a control changes. */
   draw(draw: () => void | Promise<void>) {

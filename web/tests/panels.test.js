@@ -6,6 +6,9 @@ import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { SMALL, address, brightness, canvasHash, close, launch, open, rendered, renderedAnew, show, slide, text } from "./page.js";
 
+/** The lecture under the usual light; its figures need no scene, so this one is loaded quickest. */
+const LECTURE = `${SMALL}&scene=sphere&panel=lecture`;
+
 before(launch);
 after(close);
 
@@ -444,11 +447,14 @@ const figureOf = (page) => page.$eval("#figure", (figure) => {
   return JSON.stringify([[...figure.querySelectorAll("svg")].map((svg) => svg.innerHTML), canvases, figure.querySelector(".result").textContent]);
 });
 
+/** Waits until the lecture's figure shows what its controls say. */
+const settled = (page) => page.waitForSelector("#figure:not([data-drawing])");
+
 /** Waits until the lecture's figure was drawn so often. */
 const drawn = (page, n) => page.waitForFunction((n) => Number(document.getElementById("figure")?.dataset.drawn ?? 0) >= n, n);
 
 test("every step of the lecture has a figure that each of its controls changes", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture`);
+  const { page, done } = await open(`${LECTURE}`);
   page.setDefaultTimeout(180_000);
   const steps = await page.$$eval("#steps a", (all) => all.length);
   assert.equal(steps, 15);
@@ -463,7 +469,7 @@ test("every step of the lecture has a figure that each of its controls changes",
     assert.ok(controls.length > 0, `step ${step} has a control`);
     let times = Number(await page.$eval("#figure", (figure) => figure.dataset.drawn));
     for (const control of controls) {
-      await page.waitForTimeout(50);
+      await settled(page);
       const before = await figureOf(page), value = await control.inputValue();
       const name = await control.evaluate((control) => control.closest("label").textContent);
       if (await control.evaluate((control) => control.localName) === "select") {
@@ -475,7 +481,7 @@ test("every step of the lecture has a figure that each of its controls changes",
         if (await control.inputValue() === value) await page.keyboard.press("ArrowLeft");
       }
       await drawn(page, ++times);
-      await page.waitForTimeout(50);
+      await settled(page);
       assert.notEqual(await figureOf(page), before, `“${name}” changes the figure of step ${step}`);
     }
   }
@@ -483,7 +489,7 @@ test("every step of the lecture has a figure that each of its controls changes",
 });
 
 test("the first step of the lecture plays, pauses, steps, is dragged and read", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture&step=1&figure=0;0`);
+  const { page, done } = await open(`${LECTURE}&step=1&figure=0;0`);
   await drawn(page, 1);
   const result = () => text(page, "#figure .result");
   const samples = () => page.locator("#figure label", { hasText: "Samples" }).locator("output").textContent().then(Number);
@@ -531,10 +537,11 @@ const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[
   6: [[0.5, 0.3], [0.5, 0.7]], 7: [[0.3, 0.3], [0.6, 0.5]], 8: [[0.6, 0.5], [0.8, 0.5]], 9: [[0.6, 0.5], [0.75, 0.5]], 10: [[0.5, 0.7], [0.5, 0.4]], 11: [[0.5, 0.5], [0.7, 0.5]],
   13: [[0.4, 0.5], [0.6, 0.5]], 14: [[0.03, 0.3], [0.97, 0.6]], 15: [[0.16, 0.3], [0.66, 0.8]] };
 
-for (let step = 1; step <= 15; step++) {
-  test(`the figure of step ${step} plays, pauses, is dragged and read`, async () => {
+test("the figure of every step plays, pauses, is dragged and read", async (t) => {
+  const { page, done } = await open(LECTURE);
+  for (let step = 1; step <= 15; step++) await t.test(`step ${step}`, async () => {
     // One repeat of the four ways at equal time takes least.
-    const { page, done } = await open(`${SMALL}&panel=lecture&step=${step}${step === 12 ? "&figure=time;0;1" : ""}`);
+    await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=${step}${step === 12 ? "&figure=time;0;1" : ""}`);
     await page.waitForSelector(`html[data-step='${step}']`);
     await drawn(page, 1);
     // From its last step, a figure would start over.
@@ -543,7 +550,7 @@ for (let step = 1; step <= 15; step++) {
       input.value = input.min;
       input.dispatchEvent(new Event("input", { bubbles: true }));
     });
-    await page.waitForTimeout(300);
+    await settled(page);
     const before = await figureOf(page);
     // A busy machine may draw so slowly that playback ends before another click.
     const wasPlaying = await page.evaluate(async () => {
@@ -558,7 +565,7 @@ for (let step = 1; step <= 15; step++) {
     assert.ok(wasPlaying);
     const position = () => page.$eval("#figure .player", (player) => player.previousElementSibling.querySelector("input").value);
     const paused = await position();
-    await page.waitForTimeout(500);
+    await page.waitForTimeout(350);
     assert.equal(await position(), paused, "a paused figure stands still");
     assert.notEqual(await figureOf(page), before, "it plays");
     const framed = page.locator("#figure [data-frame]").first();
@@ -576,18 +583,18 @@ for (let step = 1; step <= 15; step++) {
       await page.mouse.down();
       await page.mouse.move(...at(to), { steps: 3 });
       await page.mouse.up();
-      await page.waitForTimeout(300);
+      await settled(page);
       assert.notEqual(await figureOf(page), shown, "dragging changes the figure");
       if (![7, 14, 15].includes(step)) assert.notEqual(await values(), set, "dragging moves a slider");
     } else await page.mouse.move(...at(to));
-    await page.waitForTimeout(200);
+    await settled(page);
     assert.notEqual(await read(), readAt, "other places have other values");
-    await done();
   });
-}
+  await done();
+});
 
 test("the answer of step 12 is what its figure shows, with the repeats' standard errors", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture&step=12&figure=counts;0;2`);
+  const { page, done } = await open(`${LECTURE}&step=12&figure=counts;0;2`);
   page.setDefaultTimeout(180_000);
   await drawn(page, 1);
   const captions = await page.$$eval("#figure figcaption", (all) => all.map((caption) => caption.textContent));
@@ -602,7 +609,7 @@ test("the answer of step 12 is what its figure shows, with the repeats' standard
 });
 
 test("step 9 names the density with the least variance, which is not the product where most of it is occluded", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture&step=9`);
+  const { page, done } = await open(`${LECTURE}&step=9`);
   await drawn(page, 1);
   const seen = new Set();
   for (const edge of [1, 0.6, 0.45, 0.38, 0.34]) {
@@ -620,7 +627,7 @@ test("step 9 names the density with the least variance, which is not the product
 });
 
 test("a teacher presents: F, PageDown, arrow keys, and labels of 24 px", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture&step=1`, { viewport: { width: 1920, height: 1080 } });
+  const { page, done } = await open(`${LECTURE}&step=1`, { viewport: { width: 1920, height: 1080 } });
   await drawn(page, 1);
   await page.keyboard.press("f");
   await page.waitForSelector("html[data-presenting]");
@@ -649,7 +656,7 @@ test("a teacher presents: F, PageDown, arrow keys, and labels of 24 px", async (
 });
 
 test("a link shows the lecture's figure as it was left", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture&step=8&figure=-0.5;3;2`);
+  const { page, done } = await open(`${LECTURE}&step=8&figure=-0.5;3;2`);
   await drawn(page, 1);
   const values = () => page.$$eval("#figure input, #figure select", (all) => all.map((control) => control.value));
   assert.deepEqual(await values(), ["-0.5", "3", "2"]);
@@ -658,18 +665,18 @@ test("a link shows the lecture's figure as it was left", async () => {
   await page.click("#steps li:nth-child(9) a");
   await page.waitForFunction(() => /step=9/.test(location.hash) && !/figure/.test(location.hash));
   await page.goto("about:blank");
-  await page.goto(`${address}#${SMALL}&panel=lecture&step=8&figure=x;;9`);
+  await page.goto(`${address}#${LECTURE}&step=8&figure=x;;9`);
   await drawn(page, 1);
   assert.deepEqual(await values(), ["-1.3", "8", "1"], "what is none is as the figure has it");
   await page.goto("about:blank");
-  await page.goto(`${address}#${SMALL}&panel=lecture&step=6&figure=alike;3`);
+  await page.goto(`${address}#${LECTURE}&step=6&figure=alike;3`);
   await drawn(page, 1);
   assert.deepEqual(await values(), ["alike", "3"]);
   await done();
 });
 
 test("the lecture is read by keys, and its figures follow the window", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture&step=13`);
+  const { page, done } = await open(`${LECTURE}&step=13`);
   await page.waitForSelector("#figure svg");
   const [next, previous] = ["Next →", "← Previous"].map((name) => page.locator(`#step .steps button:has-text("${name}")`));
   await next.focus();
@@ -690,7 +697,7 @@ test("the lecture is read by keys, and its figures follow the window", async () 
 });
 
 test("on paper the answers are open and the page is light", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture&step=2`, { colorScheme: "dark" });
+  const { page, done } = await open(`${LECTURE}&step=2`, { colorScheme: "dark" });
   await drawn(page, 1);
   const paper = () => page.evaluate(() => getComputedStyle(document.documentElement).backgroundColor);
   const dark = await paper();
@@ -727,7 +734,7 @@ test("the picture stays in sight while its controls are used", async () => {
 });
 
 test("sliders say their values as they are written", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture&step=2`);
+  const { page, done } = await open(`${LECTURE}&step=2`);
   await drawn(page, 1);
   await slide(page, "#figure input", 50);
   const said = await page.$$eval("#figure input", (all) => all.map((input) => [input.getAttribute("aria-valuetext"), input.closest("label").querySelector("output").textContent]));
@@ -738,7 +745,7 @@ test("sliders say their values as they are written", async () => {
 });
 
 test("all steps are printed, with and without answers", async () => {
-  const { page, done } = await open(`${SMALL}&panel=lecture`, { script: "window.print = () => { window.printed = true; };" });
+  const { page, done } = await open(`${LECTURE}`, { script: "window.print = () => { window.printed = true; };" });
   page.setDefaultTimeout(180_000);
   for (const answers of [true, false]) {
     await page.setChecked("#with-answers", answers);
@@ -910,7 +917,7 @@ test("another page shows a step alone", async () => {
   for (const hidden of ["#tabs", "#steps", "#picture", "#step .steps"]) assert.ok(await page.isHidden(hidden), hidden);
   assert.equal(await page.evaluate(() => window.domelight.picture.jobs.length), 0, "no picture is rendered");
   await done();
-  const whole = await open(`${SMALL}&panel=lecture&step=9`);
+  const whole = await open(`${LECTURE}&step=9`);
   await drawn(whole.page, 1);
   await whole.page.evaluate(() => {
     document.querySelector("meta[name=base]").content = "https://example.org/domelight.html";

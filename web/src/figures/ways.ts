@@ -1,6 +1,8 @@
 // Step 12: four ways to sample the direct illumination of a sphere, measured with repeats.
 
+import type { App } from "../app";
 import { h, short } from "../dom";
+import type { Host } from "../engines";
 import { Film, FilmView, luminance } from "../film";
 import { pixels } from "../pointer";
 import type { Stage } from "../stage";
@@ -50,6 +52,68 @@ function mean(runs: Run[], of: (run: Run) => number): [number, number] {
 
 const withError = ([m, sd]: [number, number], digits = 2) => `${short(Number(m.toPrecision(digits)))}${isFinite(sd) ? ` ± ${short(Number(sd.toPrecision(1)))}` : ""}`;
 
+/** What renders the four ways: one picture after the other, kept as long as the page is open. */
+class Lab {
+  private static all = new WeakMap<App, Lab>();
+  static of(app: App): Lab {
+    const lab = Lab.all.get(app) ?? new Lab(app.engines.extra());
+    Lab.all.set(app, lab);
+    return lab;
+  }
+
+  /** The repeats of each way, by share of diffuse reflectance, comparison and name. */
+  readonly known = new Map<string, Run[]>();
+  private truths = new Map<number, Promise<Rendered[]>>();
+  private last: Promise<unknown> = Promise.resolve();
+  private token = 0;
+  private loaded = NaN;
+  private constructor(private host: Host) {}
+
+  /** Two reference pictures. */
+  truth(share: number): Promise<Rendered[]> {
+    const { strategy, spp } = TRUTH, found = this.truths.get(share) ?? Promise.all([1, 2].map(() => this.render(share, strategy, spp)));
+    this.truths.set(share, found);
+    return found;
+  }
+
+  /** Renders a picture when those before are done, stopped after so much of the engine's time if it is timed. */
+  render(share: number, strategy: string, spp: number, milliseconds = Infinity): Promise<Rendered> {
+    const next = this.last.then(async () => {
+      await this.load(share);
+      return this.start(strategy, spp, milliseconds);
+    });
+    this.last = next.catch(() => {});
+    return next;
+  }
+
+  private async load(share: number) {
+    if (this.loaded === share) return;
+    await this.host.call("loadScene", JSON.stringify({ scene: "sphere-orthographic", material: `phong:50:1:${share}`, ground: false }));
+    await this.host.call("loadEnvironment", JSON.stringify({ probe: "cathedral", rows: 128, rotate: 0, scale: 1, exposure: 0 }));
+    this.loaded = share;
+  }
+
+  private start(strategy: string, spp: number, milliseconds: number) {
+    return new Promise<Rendered>((resolve, reject) => {
+      const { host } = this, film = new Film(SIZE, SIZE), token = ++this.token;
+      let time = 0;
+      host.onRender = (message) => {
+        if (message.token !== token) return;
+        if (message.kind === "failed") reject(new Error(message.error));
+        if (message.kind !== "update") return;
+        film.put(message.windows, message.pixels);
+        time += message.milliseconds;
+        // Every pixel has at least one sample.
+        if (message.complete || (time >= milliseconds && message.statistics.samples >= 1)) {
+          host.send({ kind: "stop" });
+          resolve({ film, rays: message.statistics.shadowRays, time });
+        }
+      };
+      host.send({ kind: "render", token, settings: JSON.stringify({ width: SIZE, height: SIZE, spp, strategy, seed: token, hideEnvironment: true, camera: null, shard: [0, 1] }) });
+    });
+  }
+}
+
 export const fourWays = (stage: Stage) => {
   const by = stage.choice("Compare", [["counts", "at the counts above"], ["time", "at equal time"]]);
   const diffuse = stage.slider("Diffuse share", 0, 0.8, 0.1, 0);
@@ -61,33 +125,7 @@ export const fourWays = (stage: Stage) => {
   });
   stage.drawing.replaceChildren(h("div", { class: "quartet" }, ...figures.map((f) => f.figure)));
   const pointed = stage.pointer(() => {});
-  const host = stage.app.engines.extra(), truths = new Map<number, Rendered[]>(), known = new Map<string, Run[]>();
-  let token = 0;
-  /** Renders a picture, stopped after so much of the engine's time if it is timed. */
-  const render = (strategy: string, spp: number, milliseconds = Infinity) => new Promise<Rendered>((resolve, reject) => {
-    const film = new Film(SIZE, SIZE), mine = ++token;
-    let time = 0;
-    host.onRender = (message) => {
-      if (message.token !== mine) return;
-      if (message.kind === "failed") reject(new Error(message.error));
-      if (message.kind !== "update") return;
-      film.put(message.windows, message.pixels);
-      time += message.milliseconds;
-      // Every pixel has at least one sample.
-      if (message.complete || (time >= milliseconds && message.statistics.samples >= 1)) {
-        host.send({ kind: "stop" });
-        resolve({ film, rays: message.statistics.shadowRays, time });
-      }
-    };
-    host.send({ kind: "render", token: mine, settings: JSON.stringify({ width: SIZE, height: SIZE, spp, strategy, seed: mine, hideEnvironment: true, camera: null, shard: [0, 1] }) });
-  });
-  let loaded = NaN;
-  const load = async (share: number) => {
-    if (loaded === share) return;
-    loaded = share;
-    await host.call("loadScene", JSON.stringify({ scene: "sphere-orthographic", material: `phong:50:1:${share}`, ground: false }));
-    await host.call("loadEnvironment", JSON.stringify({ probe: "cathedral", rows: 128, rotate: 0, scale: 1, exposure: 0 }));
-  };
+  const lab = Lab.of(stage.app), { known } = lab;
   /** Shows the repeats that there are of those that are wanted. */
   const show = (all: Run[][], timed: boolean, wanted: number) => {
     const n = all[0].length;
@@ -103,16 +141,15 @@ export const fourWays = (stage: Stage) => {
   };
   stage.draw(async () => {
     const share = diffuse(), timed = by() === "time", n = repeats();
-    await load(share);
-    if (!truths.has(share)) truths.set(share, [await render(TRUTH.strategy, TRUTH.spp), await render(TRUTH.strategy, TRUTH.spp)]);
-    const truth = truths.get(share)!, runsOf = ({ name }: { name: string }) => known.get(`${share} ${timed} ${name}`) ?? [];
-    const isStill = () => share === diffuse() && timed === (by() === "time");
+    const truth = await lab.truth(share), runsOf = ({ name }: { name: string }) => known.get(`${share} ${timed} ${name}`) ?? [];
+    // A figure that was left, or shows something else by now, renders no more.
+    const isStill = () => stage.place.isConnected && share === diffuse() && timed === (by() === "time");
     // All ways have as many repeats at any time, so that the figure compares like with like.
     for (let k = 1; k <= n && isStill(); k++) {
       for (const way of WAYS) {
         const runs = runsOf(way);
         if (runs.length >= k || !isStill()) continue;
-        const picture = await (timed ? render(way.few, 4096, EQUAL_TIME) : render(way.strategy, 1));
+        const picture = await (timed ? lab.render(share, way.few, 4096, EQUAL_TIME) : lab.render(share, way.strategy, 1));
         known.set(`${share} ${timed} ${way.name}`, [...runs, { ...picture, error: errorOf(picture, truth) }]);
       }
       if (isStill()) show(WAYS.map((way) => runsOf(way).slice(0, k)), timed, n);
