@@ -12,14 +12,16 @@ export interface Article {
 
 /** The step of an index; on paper, the answer is open from the beginning, or left out. */
 export function article(i: number, { title = STEPS[i].title, open = false, withAnswer = true } = {}): Article {
-  const { text, formulas, question, answer } = STEPS[i];
+  const { text, formulas, algorithm, question, answer, sources } = STEPS[i];
   const figure = h("div", { class: "figure" }), answers = h("p", {}, answer);
   const formulaBox = h("div", { class: "formula", tabindex: "0", role: "group", "aria-label": "Formulas" });
   formulaBox.innerHTML = formulas.map((formula) => `<math display="block">${formula}</math>`).join("");
   const details = h("details", open ? { open: "" } : {}, h("summary", {}, "Answer"), answers);
   const elements = [
-    h("h2", { tabindex: "-1" }, title), ...text.map((paragraph) => h("p", {}, paragraph)), formulaBox, figure,
+    h("h2", { tabindex: "-1" }, title), ...text.map((paragraph) => h("p", {}, paragraph)), formulaBox,
+    ...(algorithm ? [h("ol", { class: "algorithm" }, ...algorithm.map((line) => h("li", {}, line)))] : []), figure,
     h("div", { class: "question" }, h("p", {}, question), ...(withAnswer ? [details] : [])),
+    h("ul", { class: "sources", "aria-label": "Literature" }, ...sources.map((source) => h("li", {}, source))),
   ];
   return { elements, figure, answer: (found) => { answers.textContent = found.replaceAll(" %", "\u00a0%"); } };
 }

@@ -1,9 +1,10 @@
 // The interactive figures of the lecture, one for each step.
 
 import { biasAndVariance, combination, inversion, product, rejection, resampling } from "./figures/curve_figures";
+import { cuts } from "./figures/cuts";
 import { estimator } from "./figures/estimator";
 import { halfVectors, lobes, ward } from "./figures/lobes";
-import { cuts, environmentSamples, rowsAndColumns } from "./figures/maps";
+import { environmentSamples, rowsAndColumns } from "./figures/maps";
 import { fourWays } from "./figures/ways";
 import type { Stage } from "./stage";
 

@@ -7,9 +7,22 @@ export interface Step {
   text: string[];
   /** Equations in presentation MathML. */
   formulas: string[];
+  /** An algorithm, as numbered lines. */
+  algorithm?: string[];
   question: string;
   answer: string;
+  /** The literature. */
+  sources: string[];
 }
+
+/** What several steps cite. */
+const KAJIYA = "Kajiya, The Rendering Equation, SIGGRAPH 1986.";
+const BURKE = "Burke, Ghosh and Heidrich, Bidirectional Importance Sampling for Direct Illumination, EGSR 2005.";
+const VEACH = "Veach and Guibas, Optimally Combining Sampling Techniques for Monte Carlo Rendering, SIGGRAPH 1995.";
+const DEBEVEC = "Debevec, A Median Cut Algorithm for Light Probe Sampling, SIGGRAPH 2005 posters.";
+const VIRIYOTHAI = "Viriyothai and Debevec, Variance Minimization Light Probe Sampling, SIGGRAPH 2009 posters.";
+const PROBES = "Debevec, Rendering Synthetic Objects into Real Scenes, SIGGRAPH 1998.";
+const PBRT = "Pharr, Jakob and Humphreys, Physically Based Rendering, 4th edition, 2023.";
 
 const i = (x: string) => `<mi>${x}</mi>`;
 const n = (x: number | string) => `<mn>${x}</mn>`;
@@ -29,43 +42,53 @@ const int = (a: string) => `<msub>${o("∫")}${row(a)}</msub>`;
 const tall = (...x: string[]) => row(o("("), ...x, o(")"));
 const par = (...x: string[]) => row('<mo stretchy="false">(</mo>', ...x, '<mo stretchy="false">)</mo>');
 const sqrt = (...x: string[]) => `<msqrt>${x.join("")}</msqrt>`;
+const at = (j: string) => par(sub(i("ω"), row(i("i"), o(","), j)));
+/** A term that cancels against another. */
+const cancelled = (...x: string[]) => `<mrow class="cancelled">${x.join("")}</mrow>`;
 const eq = o("="), d = `<mspace width="0.17em"/><mi mathvariant="normal">d</mi>`;
 const wi = sub(i("ω"), i("i")), wo = sub(i("ω"), i("o")), wh = sub(i("ω"), i("h"));
 const fr = ofKind("lobe", sub(i("f"), i("r"))), cos = (x: string) => ofKind("lobe", i("cos"), of, sub(i("θ"), x));
 const Li = ofKind("light", sub(i("L"), i("i"))), V = ofKind("visibility", i("V")), qLight = ofKind("light", sub(i("q"), i("m"))), qLobe = ofKind("lobe", sub(i("q"), i("n")));
 const phat = `<mover>${i("p")}${o("^")}</mover>`;
+const Lns = sub(i("L"), i("ns"));
 const overN = frac(n(1), i("N")), sumN = sum(row(i("j"), eq, n(1)), i("N"));
 
 export const STEPS: Step[] = [
   {
     title: "Estimate an integral",
     text: [
-      "A pixel’s direct illumination is an integral over all directions: reflectance times cosine, times incident light, times visibility. It has no closed form for a photographed sky.",
+      "A pixel’s direct illumination is an integral over the hemisphere: reflectance times cosine, times incident light, times visibility. Under a photographed sky it has no closed form, and summing over all texels of the map, with a shadow ray to each, is too expensive for every pixel.",
       "But it has a Monte Carlo estimate. Sample directions from any density that is positive wherever the integrand is, divide each value by the density of its direction, and average. The estimate is unbiased for every N; only its standard deviation depends on the density, and it falls with the square root of N.",
     ],
-    formulas: [row(i("I"), eq, o("∫"), ofKind("product", i("f"), par(i("x"))), d, i("x"), o("≈"), overN, sumN, frac(ofKind("product", i("f"), par(sub(i("x"), i("j")))), ofKind("light", i("p"), par(sub(i("x"), i("j")))))), row(i("σ"), o("∝"), frac(n(1), sqrt(i("N"))))],
+    formulas: [row(sub(i("L"), i("r")), par(i("x"), o(","), wo), eq, int(i("Ω")), fr, par(i("x"), o(","), wo, o(","), wi), Li, par(i("x"), o(","), wi), cos(i("i")), V, par(wi), d, wi), row(i("I"), eq, o("∫"), ofKind("product", i("f"), par(i("x"))), d, i("x"), o("≈"), overN, sumN, frac(ofKind("product", i("f"), par(sub(i("x"), i("j")))), ofKind("light", i("p"), par(sub(i("x"), i("j")))))), row(i("σ"), o("∝"), frac(n(1), sqrt(i("N"))))],
     question: "How many more samples halve the error? Press Play, then drag p until it resembles f.",
     answer: "Four times as many: on log axes the error falls with slope −½. A density shaped like the integrand lowers the whole line, and a density exactly proportional to it has no error at all.",
+    sources: [KAJIYA, PBRT],
   },
   {
     title: "Cosine and Phong lobes",
     text: [
       "If the reflectance has a simple shape, directions can be sampled in proportion to it: map two uniform numbers through its inverse cumulative distribution. For a power of the cosine about an axis, the polar angle is the arc cosine of a root.",
-      "The diffuse lobe is the power 1 about the normal. Phong’s lobe is the power n about the mirror direction, so sampled directions are rotated to that axis; directions below the surface count as zero.",
+      "The diffuse lobe is the power 1 about the normal. Phong’s lobe is the power n about the mirror direction, so directions sampled about the z axis must be rotated to it; directions below the surface count as zero. Gaussian and GGX lobes can be inverted in the same way.",
     ],
     formulas: [row(i("p"), par(i("θ"), o(","), i("φ")), eq, frac(row(i("n"), o("+"), n(1)), row(n(2), i("π"))), sup(i("cos"), i("n")), of, i("θ")), row(i("θ"), eq, i("arccos"), of, sup(par(n(1), o("−"), sub(i("u"), n(1))), frac(n(1), row(i("n"), o("+"), n(1))))), row(i("φ"), eq, n(2), i("π"), sub(i("u"), n(2)))],
     question: "Lower the exponent, then raise it. Why does the taller lobe lose fewer samples?",
     answer: "A density integrates to one, so a narrow lobe is tall. It also stays clear of the horizon, below which samples are lost, unless the viewer is at a grazing angle.",
+    sources: ["Phong, Illumination for Computer Generated Pictures, CACM 1975.", "Lafortune and Willems, Using the Modified Phong Reflectance Model for Physically Based Rendering, 1994."],
   },
   {
     title: "Ward’s anisotropic Gaussian",
     text: [
-      "Brushed metal has elongated highlights. Ward models it by a Gaussian of the half vector’s slope, with one width along the brush and another across it. Proportionality is enough: constants cancel when the cumulative distribution is normalized.",
-      "The azimuth is sampled first, scaled by the ratio of the widths; the polar angle follows from the width at that azimuth.",
+      "Ward models a rough surface by a Gaussian of the half vector’s slope. Proportionality is enough: constants cancel when the cumulative distribution is normalized. With one width α, the azimuth is uniform and the polar angle is the arc tangent of α √(−ln u).",
+      "Brushed metal has elongated highlights: one width along the brush and another across it. The azimuth is then sampled first, scaled by the ratio of the widths; the polar angle follows from the width at that azimuth. The arc tangent has values between −90° and 90° only, so the azimuth must be put into the quadrant of 2π u: without that, half of the lobe would never be sampled.",
     ],
-    formulas: [row(sub(i("φ"), i("h")), eq, i("arctan"), of, tall(frac(sub(i("α"), i("y")), sub(i("α"), i("x"))), i("tan"), of, par(n(2), i("π"), sub(i("u"), n(2))))), row(sub(i("θ"), i("h")), eq, i("arctan"), of, sqrt(frac(row(o("−"), i("ln"), of, sub(i("u"), n(1))), row(frac(row(sup(i("cos"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))))],
+    formulas: [
+      row(i("p"), par(wh), o("∝"), i("exp"), of, tall(o("−"), frac(row(sup(i("tan"), n(2)), sub(i("θ"), i("h"))), sup(i("α"), n(2))))), row(sub(i("θ"), i("h")), eq, i("arctan"), of, par(i("α"), sqrt(row(o("−"), i("ln"), of, sub(i("u"), n(1)))))), row(sub(i("φ"), i("h")), eq, n(2), i("π"), sub(i("u"), n(2))),
+      row(i("p"), par(wh), o("∝"), i("exp"), of, tall(o("−"), sup(i("tan"), n(2)), sub(i("θ"), i("h")), tall(frac(row(sup(i("cos"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))),
+      row(sub(i("φ"), i("h")), eq, i("arctan"), of, tall(frac(sub(i("α"), i("y")), sub(i("α"), i("x"))), i("tan"), of, par(n(2), i("π"), sub(i("u"), n(2))))), row(sub(i("θ"), i("h")), eq, i("arctan"), of, sqrt(frac(row(o("−"), i("ln"), of, sub(i("u"), n(1))), row(frac(row(sup(i("cos"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))))],
     question: "Which way does the highlight stretch when α along x grows?",
     answer: "Along x: the half vectors tilt farther that way, and the reflected directions twice as far.",
+    sources: ["Ward, Measuring and Modeling Anisotropic Reflection, SIGGRAPH 1992.", "Walter, Notes on the Ward BRDF, Cornell University, 2005."],
   },
   {
     title: "From half vector to direction",
@@ -76,6 +99,7 @@ export const STEPS: Step[] = [
     formulas: [row(wi, eq, n(2), par(wh, o("·"), wo), wh, o("−"), wo), row(i("p"), par(wi), eq, frac(row(i("p"), par(wh)), row(n(4), par(wh, o("·"), wi))))],
     question: "Which patches of half vectors grow least under reflection, and how does the factor change the density there? Also lower the viewer.",
     answer: "Patches that lean away from the viewer: their directions are at grazing angles, far from the half vector, where 4 ωh·ωi is small. The same half vectors cover less solid angle there, so the density is higher. A lower viewer extends this to more patches.",
+    sources: ["Torrance and Sparrow, Theory for Off-Specular Reflection from Roughened Surfaces, JOSA 1967.", "Walter, Marschner, Li and Torrance, Microfacet Models for Refraction through Rough Surfaces, EGSR 2007."],
   },
   {
     title: "Invert a distribution",
@@ -86,6 +110,7 @@ export const STEPS: Step[] = [
     formulas: [row(i("P"), par(sub(i("x"), i("k"))), eq, frac(row(sum(row(i("j"), o("≤"), i("k")), ""), sub(i("L"), i("j"))), row(sum(i("j"), ""), sub(i("L"), i("j"))))), row(i("x"), eq, sup(i("P"), row(o("−"), n(1))), par(i("u")))],
     question: "Where on the curve do most samples land, and why?",
     answer: "Where the curve is steep, because the density is high there: equal steps in u are short steps in x.",
+    sources: [PBRT],
   },
   {
     title: "Rows, then columns",
@@ -96,46 +121,60 @@ export const STEPS: Step[] = [
     formulas: [row(i("p"), par(i("x"), o(","), i("y")), eq, i("p"), par(i("y")), i("p"), par(i("x"), o("|"), i("y"))), row(i("p"), par(i("y")), o("∝"), i("sin"), of, sub(i("θ"), i("y")), sum(i("x"), ""), sub(i("L"), row(i("x"), i("y"))))],
     question: "Leave sin θ out: which rows gain?",
     answer: "The rows at the top and bottom. Under a constant sky all rows would be equally likely, although the upper edge of the top row is a single point.",
+    sources: [PROBES, PBRT],
   },
   {
     title: "Sample the environment",
     text: [
-      "With both tables, directions are sampled in proportion to the light. Then light over density is constant, equal to the map’s total, and only reflectance times cosine times visibility varies.",
+      "With both tables, directions are sampled in proportion to the light, by a density with the index L. Then light over density is constant, equal to the map’s total, and only reflectance times cosine times visibility varies: the variance of environment sampling is that of the BRDF and the shadows.",
       "So environment sampling works well for matte surfaces under a small sun, and poorly for mirrors, whose reflected direction is almost never sampled.",
     ],
-    formulas: [row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(row(o("∫"), Li, d, i("ω")), i("N")), sumN, fr, par(sub(i("ω"), i("j"))), cos(i("j")), V, par(sub(i("ω"), i("j"))))],
+    formulas: [
+      row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(fr, cos(row(i("i"), o(","), i("j"))), Li, at(i("j")), V, at(i("j"))), row(i("q"), at(i("j"))))),
+      row(ofKind("light", sub(i("q"), i("L"))), par(wi), eq, frac(row(Li, par(wi)), row(int(i("Ω")), Li, d, wi))),
+      row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(row(int(i("Ω")), Li, d, wi), i("N")), sumN, fr, cos(row(i("i"), o(","), i("j"))), V, at(i("j"))),
+      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(sup(tall(int(i("Ω")), Li, d, wi), n(2)), i("N")), i("Var"), of, par(fr, cos(i("i")), V)),
+    ],
     question: "How many of the samples hit the brightest hundredth of the map?",
     answer: "About the same share as its share of the total light, which the figure states; under a sky with a sun, most samples.",
+    sources: [PROBES, "Agarwal, Ramamoorthi, Belongie and Jensen, Structured Importance Sampling of Environment Maps, SIGGRAPH 2003."],
   },
   {
     title: "Combine two densities",
     text: [
       "Neither density is good everywhere. Multiple importance sampling draws directions from both and weights each sample by the densities of all techniques. Where one density is nearly zero but the integrand is not, the other technique takes over.",
-      "The weights of all techniques add up to one for every direction, so the estimate stays unbiased. The power heuristic sharpens the weights; the split of samples into M and N is a separate choice.",
+      "The weights of all techniques add up to one for every direction, so the estimate stays unbiased. With the balance heuristic, both sums have the same terms, as if all M + N samples came from the mixture of the two densities. The power heuristic sharpens the weights; the split of samples into M and N is a separate choice. Most renderers, pbrt among them, sample direct illumination in this way.",
     ],
-    formulas: [row(sub(i("w"), i("m")), eq, frac(row(i("M"), qLight), row(i("M"), qLight, o("+"), i("N"), qLobe))), row(ofKind("estimate", sub(i("I"), i("MIS"))), eq, frac(n(1), i("M")), sum("", i("M")), frac(row(i("f"), sub(i("w"), i("m"))), qLight), o("+"), frac(n(1), i("N")), sum("", i("N")), frac(row(i("f"), sub(i("w"), i("n"))), qLobe))],
+    formulas: [row(sub(i("w"), i("m")), eq, frac(row(i("M"), qLight), row(i("M"), qLight, o("+"), i("N"), qLobe))), row(ofKind("estimate", sub(i("I"), i("MIS"))), eq, frac(n(1), i("M")), sum("", i("M")), frac(row(i("f"), sub(i("w"), i("m"))), qLight), o("+"), frac(n(1), i("N")), sum("", i("N")), frac(row(i("f"), sub(i("w"), i("n"))), qLobe), eq, frac(n(1), row(i("M"), o("+"), i("N"))), sum("", row(i("M"), o("+"), i("N"))), frac(row(i("f"), par(sub(i("x"), i("j")))), tall(frac(i("M"), row(i("M"), o("+"), i("N"))), qLight, o("+"), frac(i("N"), row(i("M"), o("+"), i("N"))), qLobe)))],
     question: "Is there a lobe for which one technique alone beats the combination?",
     answer: "Yes, at the extremes: for a very wide lobe the light’s density alone, for a very narrow lobe the lobe’s density alone. The combination then has more error, but it works at both extremes, where the other technique alone fails.",
+    sources: [VEACH, PBRT],
   },
   {
     title: "The product is the target",
     text: [
       "The density proportional to reflectance times cosine times light follows the whole integrand but its visibility. Its normalization is the picture without shadows, the unoccluded radiance. It is the best density where nothing is occluded, and only there: where most of the product is in shadow, a density that sends more rays to the visible rest, even one of the two factors, may have less variance.",
-      "Samples of this density all have the same value except for visibility. Only the binary visibility has variance: zero without occlusion and in full shadow, largest where half of the light is occluded. Reflectance and light no longer contribute.",
+      "Reflectance, cosine and light cancel against the density: what remains of each sample is the unoccluded radiance, times its visibility. Only the binary visibility has variance: zero without occlusion and in full shadow, largest where half of the light is occluded. Reflectance and light no longer contribute.",
     ],
-    formulas: [row(ofKind("product", i("p"), par(wi)), eq, frac(row(fr, cos(i("i")), Li), sub(i("L"), i("ns")))), row(i("Var"), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), i("Var"), of, par(V))],
+    formulas: [
+      row(ofKind("product", i("p"), par(wi)), eq, frac(row(fr, cos(i("i")), Li), Lns)), row(Lns, eq, int(i("Ω")), fr, cos(i("i")), Li, d, wi),
+      row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(cancelled(fr, cos(i("i")), Li), V, at(i("j"))), row(cancelled(fr, cos(i("i")), Li), o("/"), Lns)), eq, frac(Lns, i("N")), sumN, V, at(i("j"))),
+      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), i("Var"), of, par(V)),
+    ],
     question: "When does the product resemble neither of its factors?",
     answer: "When light and lobe overlap only in their tails. Then both densities waste nearly all samples, and the product has a peak that neither factor has.",
+    sources: [BURKE, "Clarberg, Jarosz, Akenine-Möller and Jensen, Wavelet Importance Sampling, SIGGRAPH 2005.", "Ghosh and Heidrich, Correlated Visibility Sampling for Direct Illumination, The Visual Computer 2006."],
   },
   {
     title: "Rejection",
     text: [
-      "The product cannot be inverted, but it can be sampled by way of one factor. Sample that factor, and accept the direction with a probability proportional to the other factor; a bound on the ratio keeps the probability at most one.",
-      "Accepted directions follow the product exactly. The price is the number of tries, which grows with the looseness of the envelope and differs between pixels.",
+      "The product cannot be inverted, but it can be sampled in two steps: draw samples from one factor, then adjust them until they follow the product. Two methods do that, rejection and resampling. To reject, sample that factor, and accept the direction with a probability proportional to the other factor; a bound on the ratio keeps the probability at most one.",
+      "Accepted directions follow the product exactly. The price is the number of tries, which grows with the looseness of the envelope and differs between pixels: the time of a picture cannot be known before.",
     ],
-    formulas: [row(i("P"), par(i("keep")), eq, frac(ofKind("product", i("p"), par(wi)), ofKind("light", i("c"), o("·"), i("q"), par(wi))), o("≤"), n(1)), row(i("E"), par(i("tries")), eq, i("c"))],
+    formulas: [row(i("P"), par(i("keep")), eq, frac(ofKind("product", i("p"), par(wi)), ofKind("light", i("c"), o("·"), sub(i("q"), i("L")), par(wi))), eq, frac(row(fr, cos(i("i")), int(i("Ω")), Li, d, wi), row(i("c"), o("·"), Lns)), o("≤"), n(1)), row(i("E"), par(i("tries")), eq, i("c"))],
     question: "How do the accepted samples change when the bound is twice too high, and when it is too low?",
     answer: "Twice too high: the same distribution, half as many samples. Too low: the target is cut off where it exceeds the envelope, here beside the peak, where the lobe is strongest relative to the light; the result is biased.",
+    sources: ["von Neumann, Various Techniques Used in Connection with Random Digits, 1951.", BURKE],
   },
   {
     title: "Resampling",
@@ -146,6 +185,7 @@ export const STEPS: Step[] = [
     formulas: [row(ofKind("estimate", sub(i("L"), i("SIR"))), eq, tall(frac(n(1), i("M")), sum(row(i("m"), eq, n(1)), i("M")), sub(i("w"), i("m"))), frac(n(1), i("N")), sumN, frac(row(i("f"), par(sub(i("ω"), i("j"))), V), ofKind("product", phat, par(sub(i("ω"), i("j")))))), row(sub(i("w"), i("m")), eq, frac(ofKind("product", phat), ofKind("light", i("q"))))],
     question: "From which M can you no longer distinguish the histogram from the target?",
     answer: "It depends on the distance between candidates and target: here from 32, when the difference is within the counting noise. A narrower lobe, or light that the candidates rarely find, needs more.",
+    sources: ["Rubin, Using the SIR Algorithm to Simulate Posterior Distributions, 1988.", BURKE, "Talbot, Cline and Egbert, Importance Resampling for Global Illumination, EGSR 2005."],
   },
   {
     title: "Four ways, side by side",
@@ -159,16 +199,18 @@ export const STEPS: Step[] = [
     ],
     question: "Which method is best per ray, and which at equal time? Add some diffuse reflectance and compare again.",
     answer: "Per ray, resampling; at equal time, usually multiple importance sampling. Diffuse reflectance hurts reflectance sampling most.",
+    sources: [VEACH, BURKE],
   },
   {
     title: "Bias versus variance",
     text: [
-      "Random samples are unbiased but noisy. A fixed set of lights has no noise, but the same error every time: shadows have steps instead of soft edges.",
+      "Random samples are unbiased: the mean of many pictures is correct for every N. A single picture is noisy. A fixed set of lights is consistent: its picture approaches the correct one as N grows. For a fixed N it has no noise, but the same error every time: shadows have steps instead of soft edges.",
       "Both converge. The noise falls with the square root of N for any function; the error of fixed points depends on the function, and on the position of an edge between the points.",
     ],
-    formulas: [row(i("E"), par(sup(par(i("error")), n(2))), eq, sup(i("bias"), n(2)), o("+"), i("variance"))],
+    formulas: [row(i("E"), par(sup(par(i("error")), n(2))), eq, sup(i("bias"), n(2)), o("+"), i("variance")), row(i("unbiased:"), o(" "), i("E"), par(ofKind("estimate", sub(i("I"), i("N")))), eq, i("I")), row(i("consistent:"), o(" "), ofKind("estimate", sub(i("I"), i("N"))), o("→"), i("I"))],
     question: "Move the edge: which curve changes, and how?",
     answer: "The error of the fixed lights jumps up and down, sometimes near zero by luck. The curve of the random samples stays a line, because it shows the root of the mean square.",
+    sources: [DEBEVEC, PBRT],
   },
   {
     title: "Median cut",
@@ -177,17 +219,32 @@ export const STEPS: Step[] = [
       "A light is placed at the centroid of each region, with the region’s sum as its color. Bright areas get many small regions, dark areas a few large ones.",
     ],
     formulas: [row(int(sub(i("R"), n(1))), i("L"), d, i("ω"), eq, int(sub(i("R"), n(2))), i("L"), d, i("ω"), eq, frac(n(1), n(2)), int(i("R")), i("L"), d, i("ω"))],
+    algorithm: [
+      "Put the whole light probe into the list as one region.",
+      "Cut each region of the list across its longest side, so that both parts have the same energy. Widths count less near the poles, by the cosine of the elevation.",
+      "Repeat step 2 until there are enough regions.",
+      "Put a light at the centroid of each region, with the sum of its texels as its color.",
+    ],
     question: "How many lights end up in the brightest source, such as a sun or a lamp, and does that help?",
     answer: "As many as its energy is worth, until its regions are single texels; the figure counts them. They all shine from almost the same direction, so one light with their sum would do as well, and the rest of the map lacks the others.",
+    sources: [DEBEVEC],
   },
   {
     title: "Variance minimization",
     text: [
-      "The goal is not equal energy but a small error. The error of a light at a centroid grows with the variance of its region’s light around it. So cut where the sum of the two variances is smallest (the original of 2009 minimizes the larger one). Finally, join regions that belong together and move each light to the centroid of what is nearest to it, until nothing moves; this bends the borders.",
+      "The goal is not equal energy but a small error. The error of a light at a centroid grows with the variance of its region’s light around it. The rule of 2009 measures distances on the map and cuts where the larger of the two variances is smallest; the regions stay rectangles.",
+      "Here distances are measured on the sphere, and a cut minimizes the sum of the two variances. Finally, regions that belong together are joined, and each light moves to the centroid of what is nearest to it, until nothing moves; this bends the borders.",
       "Then a small sun or lamp stays in one region, and the lights go where the energy is spread out: to the rest of the map.",
     ],
-    formulas: [row(`<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
+    formulas: [row(i("2009:"), o(" "), `<munder>${row(i("min"))}${i("cut")}</munder>`, i("max"), of, par(i("v"), par(sub(i("R"), n(1))), o(","), i("v"), par(sub(i("R"), n(2))))), row(i("here:"), o(" "), `<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
+    algorithm: [
+      "Put the whole light probe into the list as one region.",
+      "Cut each region of the list where the larger of the two parts’ variances is smallest.",
+      "Repeat step 2 until there are enough regions.",
+      "Put a light at the centroid of each region, with the sum of its texels as its color.",
+    ],
     question: "Which method has the smaller shading error with equally many lights, and by how much?",
     answer: "Variance minimization, as the numbers under the picture show; on a map without small bright lights the difference is smaller.",
+    sources: [VIRIYOTHAI, DEBEVEC, "Lloyd, Least Squares Quantization in PCM, 1982."],
   },
 ];

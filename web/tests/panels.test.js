@@ -534,7 +534,7 @@ test("the first step of the lecture plays, pauses, steps, is dragged and read", 
 
 /** Steps and the place in their first plot or map, as shares of it, where something can be dragged, and to where. */
 const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[0.45, 0.5], [0.35, 0.5]], 4: [[0.4, 0.4], [0.25, 0.6]], 5: [[0.6, 0.5], [0.4, 0.5]],
-  6: [[0.5, 0.3], [0.5, 0.7]], 7: [[0.3, 0.3], [0.6, 0.5]], 8: [[0.6, 0.5], [0.8, 0.5]], 9: [[0.6, 0.5], [0.75, 0.5]], 10: [[0.5, 0.7], [0.5, 0.4]], 11: [[0.5, 0.5], [0.7, 0.5]],
+  6: [[0.5, 0.3], [0.5, 0.7]], 7: [[0.3, 0.3], [0.6, 0.5]], 8: [[0.6, 0.5], [0.8, 0.5]], 9: [[0.6, 0.5], [0.75, 0.5]], 10: [[0.5, 0.7], [0.5, 0.4]], 11: [[0.5, 0.5], [0.7, 0.5]], 12: [[0.9, 0.5], [0.4, 0.4]],
   13: [[0.4, 0.5], [0.6, 0.5]], 14: [[0.03, 0.3], [0.97, 0.6]], 15: [[0.16, 0.3], [0.66, 0.8]] };
 
 test("the figure of every step plays, pauses, is dragged and read", async (t) => {
@@ -571,27 +571,59 @@ test("the figure of every step plays, pauses, is dragged and read", async (t) =>
     const framed = page.locator("#figure [data-frame]").first();
     await framed.scrollIntoViewIfNeeded();
     const box = await framed.boundingBox(), at = ([x, y]) => [box.x + x * box.width, box.y + y * box.height];
-    const [from, to] = DRAGS[step] ?? [[0.5, 0.5], [0.5, 0.4]];
+    const [from, to] = DRAGS[step];
     const read = () => page.$eval("#figure", (figure) => (figure.querySelector(".readout").textContent.trim() || figure.querySelector(".result").textContent));
     await page.mouse.move(...at(from));
     await page.waitForFunction((step) => /\d/.test(document.querySelector("#figure .readout").textContent) || (step === 1 && /^Under the pointer/.test(document.querySelector("#figure .result").textContent)), step);
     const readAt = await read();
     assert.doesNotMatch(readAt, /NaN|undefined|Infinity/);
-    if (DRAGS[step]) {
-      const values = () => page.$$eval("#figure input", (all) => all.map(({ value }) => value).join(" "));
-      const [set, shown] = [await values(), await figureOf(page)];
-      await page.mouse.down();
-      await page.mouse.move(...at(to), { steps: 3 });
-      await page.mouse.up();
-      await settled(page);
-      assert.notEqual(await figureOf(page), shown, "dragging changes the figure");
-      if (![7, 14, 15].includes(step)) assert.notEqual(await values(), set, "dragging moves a slider");
-    } else await page.mouse.move(...at(to));
+    const values = () => page.$$eval("#figure input", (all) => all.map(({ value }) => value).join(" "));
+    const [set, shown] = [await values(), await figureOf(page)];
+    await page.mouse.down();
+    await page.mouse.move(...at(to), { steps: 3 });
+    await page.mouse.up();
     await settled(page);
+    assert.notEqual(await figureOf(page), shown, "dragging changes the figure");
+    if (![7, 12, 14, 15].includes(step)) assert.notEqual(await values(), set, "dragging moves a slider");
     assert.notEqual(await read(), readAt, "other places have other values");
   });
   await done();
 });
+
+for (const step of [14, 15]) {
+  test(`the first cut of step ${step} is dragged, and compared with where the methods cut`, async () => {
+    const { page, done } = await open(`${LECTURE}&step=${step}&figure=${step === 14 ? "4;map;hand;0.6" : "4;map;refined;hand;0.6"}`);
+    await drawn(page, 1);
+    const frame = page.locator("#figure canvas"), said = () => text(page, "#figure .result");
+    await frame.scrollIntoViewIfNeeded();
+    const box = await frame.boundingBox(), x = (share) => box.x + share * box.width, y = box.y + box.height / 2;
+    const left = async () => Number(/, ([\d.]+)\s%/.exec(await said())[1]);
+    const before = await left();
+    await page.mouse.move(x(0.6), y);
+    await page.mouse.down();
+    await page.mouse.move(x(0.8), y, { steps: 3 });
+    await settled(page);
+    assert.ok(await left() > before, "more light is left of a cut farther right");
+    // Where median cut cuts, both halves have the same energy.
+    const median = Number(/median cut cuts at (\d\.\d+)/i.exec(await said())[1]);
+    await page.mouse.move(x(median), y, { steps: 3 });
+    await page.mouse.up();
+    await settled(page);
+    if (step === 15) {
+      const numbers = /sphere is ([\d.]+)\s% .* map ([\d.]+)\s%\. They are least at ([\d.]+) and ([\d.]+)/.exec(await said()).slice(1).map(Number);
+      for (const k of [0, 1]) {
+        await page.mouse.move(x(numbers[2 + k]), y);
+        await page.mouse.down();
+        await page.mouse.up();
+        await settled(page);
+        const there = /sphere is ([\d.]+)\s% .* map ([\d.]+)\s%/.exec(await said()).slice(1).map(Number);
+        assert.ok(there[k] <= numbers[k] + 0.5, `the least of rule ${k} is ${there[k]} %`);
+      }
+    }
+    await page.waitForFunction(() => /figure=4%3Bmap%3B.*hand%3B/.test(location.hash));
+    await done();
+  });
+}
 
 test("the answer of step 12 is what its figure shows, with the repeats' standard errors", async () => {
   const { page, done } = await open(`${LECTURE}&step=12&figure=counts;0;2`);

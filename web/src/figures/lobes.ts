@@ -106,8 +106,8 @@ function fromAboveSvg(view: Vector, samples: Float32Array, theta: number): strin
 }
 
 /** The center and radius of a hemisphere from above, with `above` as the space on top. */
-const hemisphere = (above: number): Vector => {
-  const radius = isPresenting() ? 105 : 150;
+const hemisphere = (above: number, isAlone = false): Vector => {
+  const radius = !isPresenting() ? 150 : isAlone ? 215 : 105;
   return [figureWidth() / 2, above + radius + 22, radius];
 };
 
@@ -126,10 +126,10 @@ export const ward = (stage: Stage) => {
   const ay = stage.slider("α along y", 0.02, 0.8, 0.01, 0.08);
   const angle = stage.slider("Viewer", 0, 80, 1, 30, (x) => `${x}°`);
   const falling = stage.player("Samples", 0, 12, 11, doubled);
-  const pointed = stage.pointer((at) => angle.set(Math.min(Math.round(directionAt(at, hemisphere(0)).theta), 80)));
+  const pointed = stage.pointer((at) => angle.set(Math.min(Math.round(directionAt(at, hemisphere(0, true)).theta), 80)));
   stage.draw(async () => {
     const samples = (await stage.app.engines.call("lobeSamples", `ward:${ax()}:${ay()}:1`, angle(), 2 ** falling(), 1)) as Float32Array;
-    const view = hemisphere(0);
+    const view = hemisphere(0, true);
     let [sx, sy, mx] = [0, 0, 0];
     const n = Math.max(samples.length / 3, 1);
     for (let i = 0; i < samples.length; i += 3) [sx, sy, mx] = [sx + samples[i] ** 2, sy + samples[i + 1] ** 2, mx + samples[i]];

@@ -124,15 +124,19 @@ export const fourWays = (stage: Stage) => {
     return { view: new FilmView(canvas, false), caption, figure: h("figure", {}, canvas, caption) };
   });
   stage.drawing.replaceChildren(h("div", { class: "quartet" }, ...figures.map((f) => f.figure)));
-  const pointed = stage.pointer(() => {});
+  // Dragging moves the border between each picture and the reference.
+  let border = 1;
+  const pointed = stage.pointer(({ x }) => { border = x / SIZE > 0.98 ? 1 : x / SIZE; });
   const lab = Lab.of(stage.app), { known } = lab;
   /** Shows the repeats that there are of those that are wanted. */
-  const show = (all: Run[][], timed: boolean, wanted: number) => {
+  const show = (all: Run[][], truth: Rendered[], timed: boolean, wanted: number) => {
     const n = all[0].length;
     WAYS.forEach(({ name, counts }, i) => {
       const { view, caption } = figures[i], runs = all[i];
       view.set({ exposure: 0, curve: "agx" });
       view.show(0, runs.at(-1)!.film);
+      view.show(1, border < 1 ? truth[0].film : null);
+      view.set({ divider: border });
       caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${withError(mean(runs, (run) => run.error))}`, h("br"), `${withError(mean(runs, (run) => run.time / 1000))} s`);
     });
     const rays = WAYS.map(({ name }, i) => `${name} ${short(Number((mean(all[i], (run) => run.rays)[0] / 1000).toPrecision(3)))} thousand`);
@@ -152,14 +156,14 @@ export const fourWays = (stage: Stage) => {
         const picture = await (timed ? lab.render(share, way.few, 4096, EQUAL_TIME) : lab.render(share, way.strategy, 1));
         known.set(`${share} ${timed} ${way.name}`, [...runs, { ...picture, error: errorOf(picture, truth) }]);
       }
-      if (isStill()) show(WAYS.map((way) => runsOf(way).slice(0, k)), timed, n);
+      if (isStill()) show(WAYS.map((way) => runsOf(way).slice(0, k)), truth, timed, n);
     }
     if (!isStill()) return;
     const all = WAYS.map((way) => runsOf(way).slice(0, n)), over = pointed();
     const at = over && 4 * (Math.min(Math.floor(SIZE - over.y), SIZE - 1) * SIZE + Math.min(Math.floor(over.x), SIZE - 1));
     if (over && at !== null) {
       const [seen, y] = [luminance(all[over.frame].at(-1)!.film.pixels, at), luminance(truth[0].film.pixels, at)];
-      stage.read(`Under the pointer, ${WAYS[over.frame].name} has ${short(Number(seen.toPrecision(3)))}, the reference ${short(Number(y.toPrecision(3)))}.`);
+      stage.read(`Under the pointer, ${WAYS[over.frame].name} has ${short(Number(seen.toPrecision(3)))}, the reference ${short(Number(y.toPrecision(3)))}${border < 1 ? "; right of the border is the reference" : "; drag to uncover the reference"}.`);
     } else stage.read(null);
   });
 };

@@ -1,0 +1,237 @@
+// Steps 14 and 15: the map's division into lights, by a method and by hand.
+
+import { h, short } from "../dom";
+import { Film, FilmView } from "../film";
+import { plot, type Series } from "../plot";
+import type { Stage } from "../stage";
+import type { Point } from "./curves";
+import { COLUMNS, HEIGHT, SmallMap, WIDTH, canvas, cosine, direction, dot } from "./small_map";
+
+type Method = "median-cut" | "variance-minimization";
+interface Light { uv: Point; share: number; irradiance: number[] }
+interface Rig { lights: Light[]; diffuse: number; glossy: number }
+
+const percent = (x: number) => `${short(100 * x)} %`;
+const NAMES: Record<Method, string> = { "median-cut": "median cut", "variance-minimization": "variance minimization" };
+
+/** The lights within 2° of the brightest light, and their share of the energy. */
+function aroundBrightest(lights: Light[]): { count: number; share: number } {
+  const brightest = direction(lights.reduce((a, b) => (b.share > a.share ? b : a)).uv);
+  const near = lights.filter(({ uv }) => cosine(direction(uv), brightest) > Math.cos(Math.PI / 90));
+  return { count: near.length, share: near.reduce((sum, { share }) => sum + share, 0) };
+}
+
+/** Light, and its moments on the sphere and on the map, in a part of the map. */
+class Part {
+  energy = 0;
+  private sphere = [0, 0, 0];
+  private plane = [0, 0];
+  private squares = 0;
+
+  add(light: number, [u, v]: Point) {
+    const at = direction([u, v]);
+    this.energy += light;
+    this.sphere = this.sphere.map((c, k) => c + light * at[k]);
+    // Heights and widths have the same unit.
+    this.plane = [this.plane[0] + light * u, this.plane[1] + light * v / 2];
+    this.squares += light * (u * u + v * v / 4);
+  }
+
+  plus(other: Part, sign = 1): Part {
+    const sum = new Part();
+    sum.energy = this.energy + sign * other.energy;
+    sum.sphere = this.sphere.map((c, k) => c + sign * other.sphere[k]);
+    sum.plane = this.plane.map((c, k) => c + sign * other.plane[k]);
+    sum.squares = this.squares + sign * other.squares;
+    return sum;
+  }
+
+  /** ∫ L d² dω about the centroid, with chords of the sphere, and with distances on the map. */
+  get variance(): number {
+    return this.energy > 0 ? Math.max(this.energy - this.sphere.reduce((sum, c) => sum + c * c, 0) / this.energy, 0) : 0;
+  }
+  get planar(): number {
+    return this.energy > 0 ? Math.max(this.squares - this.plane.reduce((sum, c) => sum + c * c, 0) / this.energy, 0) : 0;
+  }
+
+  /** The centroid on the sphere. */
+  get place(): Point {
+    const [x, y, z] = this.sphere, length = Math.hypot(x, y, z) || 1;
+    return [(Math.atan2(z, x) / (2 * Math.PI) + 1) % 1, Math.acos(y / length) / Math.PI];
+  }
+}
+
+/** The first cut of the map, at each of its columns. */
+class FirstCut {
+  readonly halves: [Part, Part][] = [];
+  readonly whole: Part;
+
+  constructor(map: SmallMap) {
+    const columns = Array.from({ length: COLUMNS }, (_, x) => {
+      const part = new Part();
+      for (let y = 0; y < COLUMNS / 2; y++) part.add(map.power(y * COLUMNS + x), [(x + 0.5) / COLUMNS, (y + 0.5) / (COLUMNS / 2)]);
+      return part;
+    });
+    this.whole = columns.reduce((sum, part) => sum.plus(part), new Part());
+    let left = new Part();
+    for (const column of columns.slice(0, -1)) {
+      left = left.plus(column);
+      this.halves.push([left, this.whole.plus(left, -1)]);
+    }
+  }
+
+  at(x: number): [Part, Part] {
+    return this.halves[Math.min(Math.max(Math.round(x * COLUMNS) - 1, 0), this.halves.length - 1)];
+  }
+
+  /** A quantity of the two halves over the place of the cut, and where it is least. */
+  curve(of: (a: Part, b: Part) => number): { points: Point[]; least: Point } {
+    const points = this.halves.map(([a, b], k): Point => [(k + 1) / COLUMNS, of(a, b)]);
+    return { points, least: points.reduce((p, q) => (q[1] < p[1] ? q : p)) };
+  }
+}
+
+/** Spheres under the probe and under the lights of both methods. */
+class Spheres {
+  private views: [FilmView, HTMLElement][];
+  readonly element: HTMLElement;
+
+  constructor(names: string[]) {
+    const figures = names.map((name) => {
+      const element = h("canvas", { width: String(SPHERE), height: String(SPHERE), role: "img", "aria-label": `A matte sphere under ${name}` });
+      const caption = h("figcaption", {}, name);
+      return { view: new FilmView(element, false), caption, figure: h("figure", {}, element, caption) };
+    });
+    this.views = figures.map(({ view, caption }) => [view, caption]);
+    this.element = h("div", { class: "spheres" }, ...figures.map(({ figure }) => figure));
+  }
+
+  show(films: Film[], captions: string[]) {
+    const exposure = films[0].exposure();
+    this.views.forEach(([view, caption], i) => {
+      view.set({ exposure, curve: "standard" });
+      view.show(0, films[i]);
+      caption.textContent = captions[i];
+    });
+  }
+}
+const SPHERE = 160;
+
+/** A method's lights of the map, shown with those of the other method. */
+export const cuts = (method: Method, other: Method) => (stage: Stage) => {
+  const isMinimized = method === "variance-minimization";
+  const rounds = stage.player("Lights", 0, 9, 4, (k) => String(2 ** k));
+  const shown = stage.choice("Show", [["map", "regions on the map"], ["lights", "the lights alone"]]);
+  const refined = isMinimized ? stage.choice("Regions", [["refined", "joined and moved"], ["rectangles", "rectangles"]]) : () => "refined";
+  const by = stage.choice("Cut", [["method", `by ${NAMES[method]}`], ["hand", "once, by hand"]]);
+  const hand = stage.slider("Cut at", 0.05, 0.95, 0.005, 0.6);
+  let map: SmallMap | null = null, held: { texel: number } | null = null, first: FirstCut | null = null, spheres: Spheres | null = null;
+  // Dragging moves the cut, or holds a region, to compare it while the lights play.
+  const pointed = stage.pointer(({ x, y }) => {
+    if (by() === "hand") hand.set(Math.min(Math.max(x, 0.05), 0.95));
+    else held = { texel: Math.floor(y * HEIGHT) * WIDTH + Math.floor(x * WIDTH) };
+  });
+  let known: { key: string; rig: Rig; beside: Rig; regions: Uint32Array; films: Film[] } | null = null;
+  const divide = async (n: number) => {
+    const { engines } = stage.app, key = `${n} ${refined()}`;
+    if (known?.key === key) return known;
+    const settings = (name: string) => JSON.stringify({ method: name, refine: refined() === "refined", n, sun: false, lamps: 0 });
+    const ask = async (name: string): Promise<[Rig, Film[]]> => {
+      const rig = JSON.parse(await engines.call("lights", settings(name))) as Rig;
+      const both = isMinimized ? (await engines.call("spheres", settings(name), SPHERE, 0)) as Float32Array : new Float32Array(), size = both.length / 2;
+      return [rig, size ? [0, 1].map((k) => Film.fromRgb(SPHERE, SPHERE, both.subarray(k * size, (k + 1) * size))) : []];
+    };
+    const [beside, besideFilms] = await ask(other), [rig, films] = await ask(method);
+    const regions = (await engines.call("regions", settings(method), WIDTH)) as Uint32Array;
+    return (known = { key, rig, beside, regions, films: [...films, ...besideFilms.slice(1)] });
+  };
+  const drawHand = (map: SmallMap) => {
+    first ??= new FirstCut(map);
+    const { whole } = first, x = hand(), halves = first.at(x), context = canvas(stage, "The map, cut once by hand");
+    map.paint(context);
+    context.fillStyle = "rgb(255 211 77 / 0.25)";
+    context.fillRect(0, 0, x * WIDTH, HEIGHT);
+    context.fillStyle = "#fff";
+    context.fillRect(x * WIDTH - 1, 0, 2, HEIGHT);
+    for (const half of halves) dot(context, half.place, 2 + 8 * Math.sqrt(half.energy / whole.energy), "#ffd34d");
+    const energy = first.curve((a, b) => Math.abs(a.energy - b.energy)), median = energy.least[0];
+    const sum = first.curve((a, b) => (a.variance + b.variance) / whole.variance), worse = first.curve((a, b) => Math.max(a.planar, b.planar) / whole.planar);
+    const vertical = (at: number): Point[] => [[at, 0], [at, 1.05]];
+    const series: Series[] = isMinimized ? [
+      { name: "sum, on the sphere", kind: "first", points: sum.points }, { name: "larger, on the map (2009)", kind: "second", points: worse.points },
+      { name: "", kind: "first", as: "dots", points: [sum.least] }, { name: "", kind: "second", as: "dots", points: [worse.least] },
+      { name: "median cut", kind: "third", as: "dashed", points: vertical(median) },
+    ] : [
+      { name: "energy left of the cut", kind: "light", points: first.halves.map(([a], k): Point => [(k + 1) / COLUMNS, a.energy / whole.energy]) },
+      { name: "median cut", kind: "third", as: "dashed", points: vertical(median) }, { name: "", kind: "light", as: "dots", points: [[median, 0.5]] },
+    ];
+    stage.svg(plot([...series, { name: "", kind: "shade", points: vertical(x) }], {
+      x: { name: "place of the cut; drag it here or on the map", range: [0, 1] }, y: { name: isMinimized ? "variance, relative to the uncut map" : "share", range: [0, 1.05] }, height: 190,
+    }), "What a cut leaves on each side, over its place", context.canvas as HTMLCanvasElement);
+    const over = pointed();
+    stage.read(over ? `A cut at ${over.x.toFixed(2)} leaves ${percent(first.at(over.x)[0].energy / whole.energy)} of the light on its left.` : null);
+    const [a, b] = halves, shares = `At ${x.toFixed(2)}, ${percent(a.energy / whole.energy)} of the light is left of the cut and ${percent(b.energy / whole.energy)} right of it`;
+    const at = (p: Point) => `${p[0].toFixed(2)}`;
+    stage.say(isMinimized
+      ? `${shares}; the sum of the variances on the sphere is ${percent((a.variance + b.variance) / whole.variance)} of the uncut map’s, the larger one on the map ${percent(Math.max(a.planar, b.planar) / whole.planar)}. They are least at ${at(sum.least)} and ${at(worse.least)}; median cut cuts at ${median.toFixed(2)}.`
+      : `${shares}. Median cut cuts at ${median.toFixed(2)}.`);
+  };
+  stage.draw(async () => {
+    const isByHand = by() === "hand", n = 2 ** rounds();
+    hand.input.closest("label")!.hidden = !isByHand;
+    map ??= await SmallMap.of(stage);
+    if (isByHand) return drawHand(map);
+    const { rig, beside, regions, films } = await divide(n), over = pointed();
+    const isAlone = shown() === "lights", context = canvas(stage, isAlone ? `${n} lights` : `The map in ${n} regions`);
+    const at = over ? Math.min(Math.floor(over.y * HEIGHT), HEIGHT - 1) * WIDTH + Math.min(Math.floor(over.x * WIDTH), WIDTH - 1) : held?.texel;
+    const chosen = at === undefined ? -1 : regions[at];
+    if (isAlone) drawLights(context, rig.lights);
+    else {
+      map.paint(context);
+      drawRegions(context, regions, chosen);
+      for (const { uv, share } of rig.lights) dot(context, uv, 2 + 8 * Math.sqrt(share), "#ffd34d");
+    }
+    const drawing: HTMLElement[] = [context.canvas as HTMLCanvasElement];
+    if (isMinimized) {
+      spheres ??= new Spheres(["the probe", "variance minimization", "median cut"]);
+      spheres.show(films, ["the whole probe", `${NAMES[method]}: error ${percent(rig.diffuse)}`, `${NAMES[other]}: ${percent(beside.diffuse)}`]);
+      drawing.push(spheres.element);
+    }
+    stage.drawing.replaceChildren(...drawing);
+    const near = aroundBrightest(rig.lights);
+    const place = (i: number) => regions[2 * Math.floor(i / COLUMNS) * WIDTH + 2 * (i % COLUMNS)];
+    const area = chosen < 0 ? 0 : regions.reduce((sum, label, i) => sum + (label === chosen ? Math.sin(Math.PI * (Math.floor(i / WIDTH) + 0.5) / HEIGHT) : 0), 0) * Math.PI / (4 * HEIGHT * HEIGHT);
+    stage.read(chosen < 0 ? null : `${over ? `${map.read([over.x, over.y])}; its` : "The"} region holds ${percent(map.share((i) => place(i) === chosen))} of the light in ${percent(area)} of the directions.`);
+    const brightest = near.count > 1 ? `the ${near.count} lights within 2° of the brightest hold` : "the brightest holds";
+    stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}; ${brightest} ${percent(near.share)} of its energy. The shading error is ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; with ${NAMES[other]}, ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
+    if (isMinimized) stage.answer(answerOf(n, rig, beside, stage.app.envName));
+  });
+};
+
+/** Draws the borders of regions, and one of them in yellow. */
+function drawRegions(context: CanvasRenderingContext2D, regions: Uint32Array, chosen: number) {
+  context.fillStyle = "rgb(255 211 77 / 0.3)";
+  if (chosen >= 0) regions.forEach((label, i) => { if (label === chosen) context.fillRect(i % WIDTH, Math.floor(i / WIDTH), 1, 1); });
+  context.fillStyle = "rgb(255 255 255 / 0.8)";
+  regions.forEach((label, i) => {
+    const x = i % WIDTH, below = regions[i + WIDTH] ?? label;
+    if (label !== below || label !== regions[i - x + (x + 1) % WIDTH]) context.fillRect(x, Math.floor(i / WIDTH), 1, 1);
+  });
+}
+
+/** Draws lights in their colors, brighter ones larger. */
+function drawLights(context: CanvasRenderingContext2D, lights: Light[]) {
+  context.fillStyle = "#000";
+  context.fillRect(0, 0, WIDTH, HEIGHT);
+  for (const { uv, share, irradiance } of lights) {
+    const most = Math.max(...irradiance, 1e-9);
+    dot(context, uv, 2 + 8 * Math.sqrt(share), `rgb(${irradiance.map((c) => Math.round(255 * Math.max(c / most, 0) ** (1 / 2.2))).join(" ")})`);
+  }
+}
+
+/** Which method has the smaller shading error, as the figure shows it. */
+function answerOf(n: number, minimized: Rig, cut: Rig, map: string): string {
+  const compare = (name: string, a: number, b: number) =>
+    a === b ? `${name}, both are alike` : `${name}, ${a < b ? "variance minimization" : "median cut"} has ${short(Number((Math.max(a, b) / Math.max(Math.min(a, b), 1e-9)).toPrecision(2)))} times less`;
+  return `With ${n} light${n > 1 ? "s" : ""} of ${map}: ${compare("matte", minimized.diffuse, cut.diffuse)}; ${compare("glossy", minimized.glossy, cut.glossy)}. On a map without small bright lights the difference is smaller.`;
+}
