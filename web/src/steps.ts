@@ -44,7 +44,7 @@ const par = (...x: string[]) => row('<mo stretchy="false">(</mo>', ...x, '<mo st
 const sqrt = (...x: string[]) => `<msqrt>${x.join("")}</msqrt>`;
 const at = (j: string) => par(sub(i("ω"), row(i("i"), o(","), j)));
 /** A term that cancels against another. */
-const cancelled = (...x: string[]) => `<mrow class="cancelled">${x.join("")}</mrow>`;
+const canceled = (...x: string[]) => `<mrow class="canceled">${x.join("")}</mrow>`;
 const eq = o("="), d = `<mspace width="0.17em"/><mi mathvariant="normal">d</mi>`;
 const wi = sub(i("ω"), i("i")), wo = sub(i("ω"), i("o")), wh = sub(i("ω"), i("h"));
 const fr = ofKind("lobe", sub(i("f"), i("r"))), cos = (x: string) => ofKind("lobe", i("cos"), of, sub(i("θ"), x));
@@ -158,7 +158,7 @@ export const STEPS: Step[] = [
     ],
     formulas: [
       row(ofKind("product", i("p"), par(wi)), eq, frac(row(fr, cos(i("i")), Li), Lns)), row(Lns, eq, int(i("Ω")), fr, cos(i("i")), Li, d, wi),
-      row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(cancelled(fr, cos(i("i")), Li), V, at(i("j"))), row(cancelled(fr, cos(i("i")), Li), o("/"), Lns)), eq, frac(Lns, i("N")), sumN, V, at(i("j"))),
+      row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(canceled(fr, cos(i("i")), Li), V, at(i("j"))), row(canceled(fr, cos(i("i")), Li), o("/"), Lns)), eq, frac(Lns, i("N")), sumN, V, at(i("j"))),
       row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), i("Var"), of, par(V)),
     ],
     question: "When does the product resemble neither of its factors?",
