@@ -2,6 +2,7 @@
 
 import { $, h, latest } from "./dom";
 import type { Camera, Engines, Host } from "./engines";
+import { History } from "./history";
 import { DEFAULT, SCENES, fileName, fromHash, isBuiltinProbe, toHash, type State } from "./state";
 
 export interface SceneReport {
@@ -58,6 +59,7 @@ export class App {
 
   constructor(readonly engines: Engines) {
     this.state = this.fromAddress();
+    this.history = new History(this.state);
     engines.onRestart = () => {
       this.loaded = { scene: "", env: "", rotate: NaN };
       void this.provide().then(() => this.load());
@@ -65,6 +67,7 @@ export class App {
     addEventListener("hashchange", () => {
       if (location.hash.replace(/^#/, "") === toHash(this.state)) return;
       this.state = this.fromAddress();
+      this.history.note(this.state);
       this.forgetError();
       this.emit("all");
       this.load();
@@ -105,9 +108,50 @@ export class App {
     this.listeners.forEach((listener) => listener(what));
   }
 
+  /** Restores the state before the last change, or after the last one that was undone. */
+  undo() {
+    this.restore(this.history.undo());
+  }
+  redo() {
+    this.restore(this.history.redo());
+  }
+  readonly history: History;
+
+  /** Shows another state, as a link to it would. */
+  private restore(state: State | null) {
+    if (!state) return;
+    this.state = state;
+    this.forgetError();
+    this.keepInAddress();
+    this.emit("all");
+    this.load();
+  }
+
+  /** The state in which the lecture was left for a panel that shows its situation. */
+  left: State | null = null;
+
+  /** Shows a step's situation in another panel; `comeBack` returns to the step and to what was there before. */
+  leaveFor(change: Partial<State>) {
+    this.left = { ...this.state };
+    this.go({ ...this.state, ...change });
+  }
+  comeBack() {
+    if (this.left) this.go(this.left);
+    this.left = null;
+    this.emit("panel");
+  }
+
+  /** Shows another state; the browser's Back leads to the one before. */
+  private go(state: State) {
+    history.pushState(null, "", `#${toHash(state)}`);
+    this.history.note(state);
+    this.restore(state);
+  }
+
   /** Changes the state, and reloads scene and light if necessary. */
   set(change: Partial<State>, what: Change = "render") {
     Object.assign(this.state, change);
+    this.history.note(this.state);
     this.forgetError();
     $("wrong").hidden = true;
     // The browser's Back leads to the last panel or step.

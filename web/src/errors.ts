@@ -2,6 +2,7 @@
 
 import { $, count, short, signed } from "./dom";
 import type { Job } from "./engines";
+import { explain } from "./glossary";
 import type { Film } from "./film";
 import { GroupedMean, jackknife } from "./passes";
 import { plot, slope, type Series } from "./plot";
@@ -59,7 +60,11 @@ export class ErrorPlot {
     const text = isMeasured
       ? `Relative RMSE at whole passes, measured against a reference of ${reference.renders} independent renders with ${reference.samples} samples per pixel in all: ${found}${hidden}.`
       : `An estimate from the variance of the samples, which shows neither bias nor rare bright samples, until ${reference.failure ? `a reference is possible (${reference.failure})` : "the reference is rendered"}: ${found}.`;
-    caption.textContent = text;
+    // A term that is being read stays.
+    if (caption.textContent !== text) {
+      caption.textContent = text;
+      explain(caption);
+    }
     place.setAttribute("aria-label", text);
   }
 }

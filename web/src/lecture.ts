@@ -6,6 +6,7 @@ import { $, h } from "./dom";
 import { FIGURES } from "./figures";
 import { printHandout } from "./handout";
 import { onFigureWidth } from "./plot";
+import { SITUATIONS } from "./situations";
 import { Stage } from "./stage";
 import { addressOf, type State } from "./state";
 import { STEPS } from "./steps";
@@ -96,7 +97,15 @@ export class Lecture {
       });
       return button;
     };
-    $("step").replaceChildren(...elements, h("div", { class: "steps" }, move("← Previous", i - 1), move("Next →", i + 1)));
+    const open = SITUATIONS[i].map(({ name, change }) => {
+      const button = h("button", { type: "button" }, name);
+      button.addEventListener("click", () => {
+        this.app.leaveFor(change);
+        $(change.panel!).scrollIntoView({ block: "start" });
+      });
+      return button;
+    });
+    $("step").replaceChildren(...elements, h("div", { class: "opens", role: "group", "aria-label": "This situation in other panels" }, "See it in", ...open), h("div", { class: "steps" }, move("← Previous", i - 1), move("Next →", i + 1)));
     // Figures need a map.
     this.stage = this.app.probe ? new Stage(figure, this.app, this.app.state.figure.split(";"), answer) : null;
     if (this.stage) FIGURES[i](this.stage);

@@ -3,6 +3,7 @@
 import { App } from "./app";
 import { $ } from "./dom";
 import { Engines } from "./engines";
+import { explain, showMeanings } from "./glossary";
 import { Lecture } from "./lecture";
 import { LightsPanel } from "./lights";
 import { MapPanel } from "./map";
@@ -37,8 +38,12 @@ async function main() {
   new LightsPanel(app);
   const lecture = new Lecture(app);
   wireTabs(app);
+  wireHistory(app);
   wireDrop(app);
   speakValues();
+  showMeanings();
+  // The terms of labels and hints; other texts are explained where they are written.
+  document.querySelectorAll<HTMLElement>("fieldset > :is(legend, label), .hint, #xray-table caption, #xray-table thead").forEach(explain);
   app.on((what) => { if (what === "all") show(app); });
   Object.assign(window, { domelight: { app, picture, map, lecture } });
   show(app);
@@ -69,6 +74,37 @@ function wireTabs(app: App) {
     choose(next);
     $(`tab-${next}`).focus();
   });
+}
+
+/** Buttons and keys that undo and redo, and the way back to the lecture. */
+function wireHistory(app: App) {
+  const [undo, redo, back] = ["undo", "redo", "back"].map((id) => $<HTMLButtonElement>(id));
+  const show = () => {
+    undo.disabled = !app.history.canUndo;
+    redo.disabled = !app.history.canRedo;
+    back.hidden = !app.left || app.state.panel === "lecture";
+    if (app.left) back.textContent = `← Back to step ${app.left.step}`;
+  };
+  undo.addEventListener("click", () => app.undo());
+  redo.addEventListener("click", () => app.redo());
+  back.addEventListener("click", () => {
+    app.comeBack();
+    $("step").querySelector<HTMLElement>("h2")?.focus();
+  });
+  addEventListener("keydown", (event) => {
+    const key = event.key.toLowerCase(), target = event.target as HTMLElement;
+    // Text fields undo their own text.
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || target.matches("textarea, input:not([type=range]):not([type=checkbox])")) return;
+    if (key === "z" && !event.shiftKey) app.undo();
+    else if (key === "y" || (key === "z" && event.shiftKey)) app.redo();
+    else return;
+    event.preventDefault();
+  });
+  app.on(() => {
+    if (app.state.panel === "lecture") app.left = null;
+    show();
+  });
+  show();
 }
 
 interface Dropped {

@@ -347,7 +347,7 @@ export class PicturePanel {
     };
     $("counts").textContent = this.jobs.map((job) => (this.jobs.length > 1 ? `${job.strategy}: ` : "") + one(job)).join(" · ");
     this.tellError();
-    const estimates = this.histories.map((history) => history.map(({ rays, error }) => ({ rays, error, isWhole: true })));
+    const estimates = this.jobs.map((_, i) => this.histories[i]).map((history) => history.map(({ rays, error }) => ({ rays, error, isWhole: true })));
     this.errors.show(this.jobs, this.measured(), estimates, this.reference);
     $("command").replaceChildren(...words(commandWords(this.app.state)));
   }

@@ -3,6 +3,7 @@
 import type { App, Change } from "./app";
 import { $, color, h, latest, percentage, short } from "./dom";
 import { Film, FilmView } from "./film";
+import { explain } from "./glossary";
 
 const SIZE = 160, DENSITY = 48;
 const LAYERS = ["light L", "reflectance f · cos θ", "visibility V", "integrand f · cos θ · L · V"];
@@ -130,6 +131,9 @@ export class XrayPanel {
         return h("div", { class: "cause" }, h("span", {}, name), h("div", {}, bar), h("span", {}, percentage(share)));
       }),
     ]));
+    explain($("xray-advice"));
+    explain($("causes"));
+    explain($("xray-table").querySelector("tbody")!);
   }
 }
 

@@ -964,6 +964,105 @@ test("another page shows a step alone", async () => {
   await whole.done();
 });
 
+test("changes are undone and redone, by buttons and by keys", async () => {
+  const { page, done } = await open(`${SMALL}&scene=sphere`);
+  await rendered(page);
+  const [undo, redo] = ["Undo", "Redo"].map((name) => page.locator(`#history button:text-is("${name}")`));
+  assert.ok(await undo.isDisabled() && await redo.isDisabled());
+  await renderedAnew(page, () => page.selectOption("#env", "studio"));
+  // A slider that is dragged is one change.
+  for (const turn of [10, 20, 30, 40]) await slide(page, "#rotate", turn);
+  await rendered(page);
+  await undo.click();
+  await page.waitForFunction(() => window.domelight.app.state.rotate === 125 && window.domelight.app.state.env === "studio");
+  assert.equal(await page.inputValue("#rotate"), "125");
+  await page.keyboard.press("Control+z");
+  await page.waitForFunction(() => window.domelight.app.state.env === "sky");
+  assert.equal(await page.inputValue("#env"), "sky");
+  assert.ok(await undo.isDisabled());
+  await page.keyboard.press("Control+Shift+z");
+  await page.keyboard.press("Control+y");
+  await page.waitForFunction(() => window.domelight.app.state.rotate === 40 && window.domelight.app.state.env === "studio");
+  await rendered(page);
+  assert.match(await text(page, "#command"), /--env studio .*--env-rotate=40/);
+  assert.ok(await redo.isDisabled());
+  // In a text field, the keys undo text.
+  await page.fill("#material", "diffuse:0.5");
+  await page.keyboard.press("Control+z");
+  assert.equal(await page.evaluate(() => window.domelight.app.state.rotate), 40);
+  // In the lecture, a figure's sliders are changes, too.
+  await show(page, "lecture");
+  await drawn(page, 1);
+  const first = "#figure input";
+  await slide(page, first, 0.5);
+  await undo.click();
+  await page.waitForFunction((first) => document.querySelector(first).value === "0", first);
+  await done();
+});
+
+test("each step shows its situation in other panels, and one comes back to its figure", async () => {
+  const { page, done } = await open(LECTURE);
+  const back = page.locator("#back");
+  for (let step = 1; step <= await page.$$eval("#steps li", (all) => all.length); step++) {
+    // One repeat of the four ways at equal time takes least.
+    await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=${step}${step === 12 ? "&figure=time;0;1" : ""}`);
+    await page.waitForSelector(`html[data-step='${step}']`);
+    await drawn(page, 1);
+    const n = await page.locator("#step .opens button").count();
+    assert.ok(n > 0, `step ${step} is seen somewhere else`);
+    for (let k = 0; k < n; k++) {
+      const button = page.locator("#step .opens button").nth(k), [panel] = (await button.textContent()).toLowerCase().replace("-", "").split(":");
+      const values = () => page.$$eval("#figure input, #figure select", (all) => all.map(({ value }) => value).join(";"));
+      if (k === 0 && step !== 12) await page.$eval("#figure input", (input) => { input.stepUp(); input.dispatchEvent(new Event("input", { bubbles: true })); });
+      const before = await values();
+      await page.evaluate(() => { for (const key of ["map", "xray", "rig"]) delete document.documentElement.dataset[key]; });
+      await button.click();
+      await page.waitForSelector(`#${panel}:not([hidden])`);
+      // The engine has begun what is asked; pictures are tested elsewhere.
+      if (panel === "picture") await page.waitForFunction(() => { const { jobs } = window.domelight.picture; return jobs.length > 0 && jobs.every((job) => job.strategy); });
+      else await page.waitForSelector(`html[data-${{ map: "map", xray: "xray", lights: "rig" }[panel]}]`);
+      assert.equal(await page.$("#status.error"), null, `step ${step}: ${await text(page, "#status")}`);
+      assert.doesNotMatch(await text(page, `#${panel}`), /NaN|undefined/);
+      assert.equal(await back.textContent(), `← Back to step ${step}`);
+      await back.click();
+      await page.waitForSelector(`html[data-step='${step}']`);
+      await page.waitForSelector("#lecture:not([hidden]) #figure");
+      assert.equal(await values(), before, `step ${step} is as it was left`);
+      assert.equal(await page.evaluate(() => window.domelight.app.state.scene), "sphere", "and so is the picture");
+      assert.ok(await back.isHidden());
+    }
+  }
+  await done();
+});
+
+test("terms are explained under the pointer and at the keyboard's focus", async () => {
+  const { page, done } = await open(`${SMALL}&scene=sphere&strategy=brdf:2`);
+  await rendered(page);
+  const meaning = page.locator("#meaning");
+  await page.waitForFunction(() => /brdf:2/.test(document.querySelector("#picture figcaption .term:last-of-type, #picture figcaption").textContent));
+  await page.locator("#picture figcaption .term", { hasText: "brdf:2" }).hover();
+  assert.match(await meaning.textContent(), /in proportion to the BRDF/);
+  // The pointer may move onto the meaning, but not away.
+  await meaning.hover();
+  await page.waitForTimeout(300);
+  assert.ok(await meaning.isVisible());
+  await page.mouse.move(2, 2);
+  await meaning.waitFor({ state: "hidden" });
+  await show(page, "lecture");
+  await drawn(page, 1);
+  const term = page.locator("#step .text .term", { hasText: "Monte Carlo" });
+  await term.focus();
+  assert.match(await meaning.textContent(), /average of random samples/);
+  assert.match(await term.getAttribute("aria-label"), /^Monte Carlo: Estimating/);
+  const [own, at] = [await meaning.boundingBox(), await term.boundingBox()];
+  assert.ok(own.y >= at.y + at.height || own.y + own.height <= at.y, "it does not cover its term");
+  await page.keyboard.press("Escape");
+  assert.ok(await meaning.isHidden());
+  await page.keyboard.press("Tab");
+  assert.ok(await meaning.isVisible(), "the next term");
+  await done();
+});
+
 test("words that a link cannot have are the defaults", async () => {
   const words = "mapping=nope&layer=nope&method=nope&curve=nope&view=nope&equal=nope&seed=-1&lamps=-1&pixel=[27,27]"
     + `&camera=${encodeURIComponent('{"origin":[0,0,9],"target":[0,0,0],"up":[0,1,0],"fov":null,"ortho":null}')}`;
