@@ -115,3 +115,64 @@ test("the X-ray works", { skip }, async () => {
   assert.ok(await brightness(page, "xray-film") > 40);
   await done();
 });
+
+/** Waits until the lecture's figure shows what its controls say. */
+const settled = (page) => page.waitForFunction(() => {
+  const figure = document.getElementById("figure");
+  return Number(figure?.dataset.drawn ?? 0) >= 1 && !figure.hasAttribute("data-drawing");
+}, { timeout: 60_000 });
+
+/** Steps of the lecture, whether dragging moves one of their controls, and the drag in shares of the first plot or map. */
+const DRAGS = [
+  [1, true, [0.9, 0.5], [0.9, 0.2]], [2, true, [0.4, 0.4], [0.25, 0.6]], [6, true, [0.5, 0.3], [0.5, 0.7]], [7, false, [0.3, 0.3], [0.6, 0.5]],
+  [9, true, [0.6, 0.5], [0.75, 0.5]], [11, true, [0.5, 0.5], [0.7, 0.5]], [14, false, [0.03, 0.3], [0.97, 0.6]],
+];
+
+test("the main figures of the lecture play, pause, are dragged and read", { skip }, async (t) => {
+  const { page, done } = await open("size=64&spp=4&rows=64&scene=sphere&panel=lecture");
+  for (const [step, moves, from, to] of DRAGS) await t.test(`step ${step}`, async () => {
+    await page.click(`#steps li:nth-child(${step}) a`);
+    await page.waitForSelector(`html[data-step='${step}']`);
+    await settled(page);
+    const values = () => page.$$eval("#figure input, #figure select", (all) => all.map(({ value }) => value));
+    const player = () => page.$eval("#figure .player", (player) => player.previousElementSibling.querySelector("input").value);
+    await page.$eval("#figure .player", (player) => {
+      const input = player.previousElementSibling.querySelector("input");
+      input.value = input.min;
+      input.dispatchEvent(new Event("input", { bubbles: true }));
+    });
+    const first = await player(), [, toggle] = await page.$$("#figure .player button");
+    await toggle.evaluate((button) => button.scrollIntoView({ block: "center" }));
+    await toggle.click();
+    await page.waitForFunction((first) => document.querySelector("#figure .player").previousElementSibling.querySelector("input").value !== first, {}, first);
+    if (await toggle.evaluate((button) => button.textContent) === "Pause") await toggle.click();
+    const paused = await player();
+    await new Promise((done) => setTimeout(done, 400));
+    assert.equal(await player(), paused, "a paused figure stands still");
+    await settled(page);
+    // The pointer reads values, and drags.
+    const box = await page.$eval("#figure [data-frame]", (framed) => {
+      framed.scrollIntoView({ block: "center" });
+      const { left, top, width, height } = framed.getBoundingClientRect();
+      return { left, top, width, height };
+    });
+    const at = ([x, y]) => [box.left + x * box.width, box.top + y * box.height];
+    const read = () => page.$eval("#figure", (figure) => figure.querySelector(".readout").textContent + figure.querySelector(".result").textContent);
+    const unread = await read(), before = await values();
+    await page.mouse.move(...at(from));
+    await page.waitForFunction((unread) => {
+      const figure = document.getElementById("figure");
+      return figure.querySelector(".readout").textContent + figure.querySelector(".result").textContent !== unread;
+    }, {}, unread);
+    const readAt = await read();
+    assert.doesNotMatch(readAt, /NaN|undefined|Infinity/);
+    await page.mouse.down();
+    await page.mouse.move(...at(to), { steps: 3 });
+    await page.mouse.up();
+    await settled(page);
+    assert.notEqual(await read(), readAt, "other places have other values");
+    const after = await values();
+    if (moves) assert.notDeepEqual(after, before, "dragging moves a control");
+  });
+  await done();
+});
