@@ -43,6 +43,7 @@ const tall = (...x: string[]) => row(o("("), ...x, o(")"));
 const par = (...x: string[]) => row('<mo stretchy="false">(</mo>', ...x, '<mo stretchy="false">)</mo>');
 const sqrt = (...x: string[]) => `<msqrt>${x.join("")}</msqrt>`;
 const at = (j: string) => par(sub(i("ω"), row(i("i"), o(","), j)));
+const space = `<mspace width="0.6em"/>`;
 /** A term that cancels against another. */
 const canceled = (...x: string[]) => `<mrow class="canceled">${x.join("")}</mrow>`;
 const eq = o("="), d = `<mspace width="0.17em"/><mi mathvariant="normal">d</mi>`;
@@ -60,7 +61,7 @@ export const STEPS: Step[] = [
       "A pixel’s direct illumination is an integral over the hemisphere: reflectance times cosine, times incident light, times visibility. Under a photographed sky it has no closed form, and summing over all texels of the map, with a shadow ray to each, is too expensive for every pixel.",
       "But it has a Monte Carlo estimate. Sample directions from any density that is positive wherever the integrand is, divide each value by the density of its direction, and average. The estimate is unbiased for every N; only its standard deviation depends on the density, and it falls with the square root of N.",
     ],
-    formulas: [row(sub(i("L"), i("r")), par(i("x"), o(","), wo), eq, int(i("Ω")), fr, par(i("x"), o(","), wo, o(","), wi), Li, par(i("x"), o(","), wi), cos(i("i")), V, par(wi), d, wi), row(i("I"), eq, o("∫"), ofKind("product", i("f"), par(i("x"))), d, i("x"), o("≈"), overN, sumN, frac(ofKind("product", i("f"), par(sub(i("x"), i("j")))), ofKind("light", i("p"), par(sub(i("x"), i("j")))))), row(i("σ"), o("∝"), frac(n(1), sqrt(i("N"))))],
+    formulas: [row(sub(i("L"), i("r")), par(wo), eq, int(i("Ω")), fr, par(wo, o(","), wi), Li, par(wi), cos(i("i")), V, par(wi), d, wi), row(i("I"), eq, o("∫"), ofKind("product", i("f"), par(i("x"))), d, i("x"), o("≈"), overN, sumN, frac(ofKind("product", i("f"), par(sub(i("x"), i("j")))), ofKind("light", i("p"), par(sub(i("x"), i("j")))))), row(i("σ"), o("∝"), frac(n(1), sqrt(i("N"))))],
     question: "How many more samples halve the error? Press Play, then drag p until it resembles f.",
     answer: "Four times as many: on log axes the error falls with slope −½. A density shaped like the integrand lowers the whole line, and a density exactly proportional to it has no error at all.",
     sources: [KAJIYA, PBRT],
@@ -145,7 +146,7 @@ export const STEPS: Step[] = [
       "Neither density is good everywhere. Multiple importance sampling draws directions from both and weights each sample by the densities of all techniques. Where one density is nearly zero but the integrand is not, the other technique takes over.",
       "The weights of all techniques add up to one for every direction, so the estimate stays unbiased. With the balance heuristic, both sums have the same terms, as if all M + N samples came from the mixture of the two densities. The power heuristic sharpens the weights; the split of samples into M and N is a separate choice. Most renderers, pbrt among them, sample direct illumination in this way.",
     ],
-    formulas: [row(sub(i("w"), i("m")), eq, frac(row(i("M"), qLight), row(i("M"), qLight, o("+"), i("N"), qLobe))), row(ofKind("estimate", sub(i("I"), i("MIS"))), eq, frac(n(1), i("M")), sum("", i("M")), frac(row(i("f"), sub(i("w"), i("m"))), qLight), o("+"), frac(n(1), i("N")), sum("", i("N")), frac(row(i("f"), sub(i("w"), i("n"))), qLobe), eq, frac(n(1), row(i("M"), o("+"), i("N"))), sum("", row(i("M"), o("+"), i("N"))), frac(row(i("f"), par(sub(i("x"), i("j")))), tall(frac(i("M"), row(i("M"), o("+"), i("N"))), qLight, o("+"), frac(i("N"), row(i("M"), o("+"), i("N"))), qLobe)))],
+    formulas: [row(sub(i("w"), i("m")), eq, frac(row(i("M"), qLight), row(i("M"), qLight, o("+"), i("N"), qLobe))), row(ofKind("estimate", sub(i("I"), i("MIS"))), eq, frac(n(1), i("M")), sum("", i("M")), frac(row(i("f"), sub(i("w"), i("m"))), qLight), o("+"), frac(n(1), i("N")), sum("", i("N")), frac(row(i("f"), sub(i("w"), i("n"))), qLobe)), row(ofKind("estimate", sub(i("I"), i("MIS"))), eq, sum("", row(i("M"), o("+"), i("N"))), frac(i("f"), row(i("M"), qLight, o("+"), i("N"), qLobe)))],
     question: "Is there a lobe for which one technique alone beats the combination?",
     answer: "Yes, at the extremes: for a very wide lobe the light’s density alone, for a very narrow lobe the lobe’s density alone. The combination then has more error, but it works at both extremes, where the other technique alone fails.",
     sources: [VEACH, PBRT],
@@ -158,7 +159,7 @@ export const STEPS: Step[] = [
     ],
     formulas: [
       row(ofKind("product", i("p"), par(wi)), eq, frac(row(fr, cos(i("i")), Li), Lns)), row(Lns, eq, int(i("Ω")), fr, cos(i("i")), Li, d, wi),
-      row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(canceled(fr, cos(i("i")), Li), V, at(i("j"))), row(canceled(fr, cos(i("i")), Li), o("/"), Lns)), eq, frac(Lns, i("N")), sumN, V, at(i("j"))),
+      row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(canceled(fr, cos(i("i")), Li), V, at(i("j"))), row(canceled(fr, cos(i("i")), Li), o("/"), Lns))), row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(Lns, i("N")), sumN, V, at(i("j"))),
       row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), i("Var"), of, par(V)),
     ],
     question: "When does the product resemble neither of its factors?",
@@ -207,7 +208,7 @@ export const STEPS: Step[] = [
       "Random samples are unbiased: the mean of many pictures is correct for every N. A single picture is noisy. A fixed set of lights is consistent: its picture approaches the correct one as N grows. For a fixed N it has no noise, but the same error every time: shadows have steps instead of soft edges.",
       "Both converge. The noise falls with the square root of N for any function; the error of fixed points depends on the function, and on the position of an edge between the points.",
     ],
-    formulas: [row(i("E"), par(sup(par(i("error")), n(2))), eq, sup(i("bias"), n(2)), o("+"), i("variance")), row(i("unbiased:"), o(" "), i("E"), par(ofKind("estimate", sub(i("I"), i("N")))), eq, i("I")), row(i("consistent:"), o(" "), ofKind("estimate", sub(i("I"), i("N"))), o("→"), i("I"))],
+    formulas: [row(i("E"), par(sup(par(i("error")), n(2))), eq, sup(i("bias"), n(2)), o("+"), i("variance")), row(i("unbiased:"), space, i("E"), par(ofKind("estimate", sub(i("I"), i("N")))), eq, i("I")), row(i("consistent:"), space, ofKind("estimate", sub(i("I"), i("N"))), o("→"), i("I"))],
     question: "Move the edge: which curve changes, and how?",
     answer: "The error of the fixed lights jumps up and down, sometimes near zero by luck. The curve of the random samples stays a line, because it shows the root of the mean square.",
     sources: [DEBEVEC, PBRT],
@@ -236,7 +237,7 @@ export const STEPS: Step[] = [
       "Here distances are measured on the sphere, and a cut minimizes the sum of the two variances. Finally, regions that belong together are joined, and each light moves to the centroid of what is nearest to it, until nothing moves; this bends the borders.",
       "Then a small sun or lamp stays in one region, and the lights go where the energy is spread out: to the rest of the map.",
     ],
-    formulas: [row(i("2009:"), o(" "), `<munder>${row(i("min"))}${i("cut")}</munder>`, i("max"), of, par(i("v"), par(sub(i("R"), n(1))), o(","), i("v"), par(sub(i("R"), n(2))))), row(i("here:"), o(" "), `<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
+    formulas: [row(i("2009:"), space, `<munder>${row(i("min"))}${i("cut")}</munder>`, of, i("max"), of, par(i("v"), par(sub(i("R"), n(1))), o(","), i("v"), par(sub(i("R"), n(2))))), row(i("here:"), space, `<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
     algorithm: [
       "Put the whole light probe into the list as one region.",
       "Cut each region of the list where the larger of the two parts’ variances is smallest.",
