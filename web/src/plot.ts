@@ -20,6 +20,8 @@ export interface Axes {
   y: { name: string; log?: boolean; range?: [number, number]; ticks?: number[] };
   height?: number;
   width?: number;
+  /** The height when it is presented: together, a figure's plots of 640 across may have 480 on a screen of 16 : 9. */
+  presented?: number;
 }
 
 /** The attribute by which the pointer is read, see `onPointer`. */
@@ -96,7 +98,7 @@ export function onFigureWidth(redraw: () => void) {
 
 /** An SVG plot of series. */
 export function plot(series: Series[], axes: Axes): string {
-  const width = axes.width ?? figureWidth(), height = (axes.height ?? 240) * (isPresenting() ? 0.75 : 1);
+  const width = axes.width ?? figureWidth(), height = isPresenting() && axes.presented || (axes.height ?? 240) * (isPresenting() ? 0.75 : 1);
   const named = series.filter((s) => s.name);
   const ofLegend = named.reduce((sum, s) => sum + widthOf(s.name) + 36, 0);
   const [left, right, bottom] = [58, 14, 38];

@@ -24,7 +24,7 @@ export const inversion = (stage: Stage) => {
       { name: `density, maximum ${short(most)}`, kind: "light", points: line(200, (t) => p(t) / most), as: "area" }, { name: "P(x)", kind: "lobe", points: line(200, (t) => table.at(t)) },
       { name: "", kind: "lobe", points: samples, as: "dots" }, { name: "", kind: "estimate", points: samples.map(([t]): Point => [t, 0]), as: "dots" },
       { name: "", kind: "shade", points: u === undefined ? [] : [[0, u], [x, u], [x, 0]] },
-    ], { x: { name: "x, drag to move the peak", range: [0, 1] }, y: { name: "u", range: [0, 1] } }), "A cumulative distribution, and samples drawn by inverting it");
+    ], { x: { name: "x, drag to move the peak", range: [0, 1] }, y: { name: "u", range: [0, 1] }, presented: 480 }), "A cumulative distribution, and samples drawn by inverting it");
     stage.read(u === undefined ? null : `u = ${u.toFixed(3)} is inverted to x = ${x.toFixed(3)}, where the density is ${short(p(x))}. ∫ p = ${integral(p).toFixed(2)}.`);
     const inside = samples.filter(([t]) => Math.abs(t - center()) < 2 * peak()).length;
     stage.say(`${inside} of ${n()} samples are in the peak.`);
@@ -53,7 +53,7 @@ export const combination = (stage: Stage) => {
     stage.svg(plot([
       { name: "light", kind: "light", points: line(400, (x) => q(x) / top(q)) }, { name: "lobe", kind: "lobe", points: line(400, (x) => lobe(x) / top(lobe)) },
       { name: "MIS weight of light samples", kind: "product", points: line(400, w), as: "area" }, marker(at, 1.05),
-    ], { x: { name: "direction, drag the lobe’s flank", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] } }), "Two densities and the MIS weight of one of them");
+    ], { x: { name: "direction, drag the lobe’s flank", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] }, presented: 480 }), "Two densities and the MIS weight of one of them");
     stage.read(at === undefined ? null : `Direction ${at.toFixed(2)}: light’s density ${short(q(at))}, lobe’s ${short(lobe(at))}, weight of a light sample ${w(at).toFixed(2)}, of a lobe sample ${(1 - w(at)).toFixed(2)}. ∫ p = ${integral(q, 8000).toFixed(2)} each.`);
     const percent = (v: number) => `${short(100 * Math.sqrt(Math.max(v, 0)) / exact)} %`;
     const best = Object.entries(errors).reduce((a, b) => (b[1] < a[1] ? b : a))[0];
@@ -87,7 +87,7 @@ export const product = (stage: Stage) => {
       { name: "light", kind: "light", points: line(400, (x) => light(x) / top(light)) }, { name: "lobe", kind: "lobe", points: line(400, lobe) },
       { name: "product", kind: "product", points: line(400, (x) => p(x) / top(p)), as: "area" },
       { name: "occluded", kind: "visibility", points: [[hidden(), 0], [1, 0]], as: "band" }, marker(at, 1.05),
-    ], { x: { name: "direction, drag the lobe or the shadow’s edge", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] } }), "Light, lobe and their product");
+    ], { x: { name: "direction, drag the lobe or the shadow’s edge", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] }, presented: 480 }), "Light, lobe and their product");
     stage.read(at === undefined ? null : `Direction ${at.toFixed(2)}: L = ${short(light(at))}, f · cos θ = ${short(lobe(at))}, V = ${at < hidden() ? 1 : 0}; densities: light ${short(q(at))}, lobe ${short(r(at))}, product ${short(p(at))}. ∫ p = ${integral(p, 4000).toFixed(2)}.`);
     const least = Math.min(...deviations.map(([, d]) => d)), best = deviations.filter(([, d]) => d <= least + 1e-6).map(([name]) => name);
     stage.say(`${short(100 * visible)} % of the product is unoccluded. Standard deviation of one sample, relative to the unoccluded radiance: ${deviations.map(([name, d]) => `${name} ${short(d)}`).join(", ")}; least here: ${best.length === 3 ? "all alike" : best.join(" and ")}.`);
@@ -116,7 +116,7 @@ export const rejection = (stage: Stage) => {
     stage.svg(plot([
       { name: "rejected", kind: "light", points: lost, as: "dots" }, { name: "kept", kind: "estimate", points: kept, as: "dots" },
       { name: "envelope c · q", kind: "light", points: line(400, (x) => c * q(x)) }, { name: "target", kind: "product", points: line(400, target) }, marker(at, height),
-    ], { x: { name: "direction, drag the envelope up and down", range: [0, 1] }, y: { name: "density", range: [0, height] }, height: 280 }), "Tries under an envelope");
+    ], { x: { name: "direction, drag the envelope up and down", range: [0, 1] }, y: { name: "density", range: [0, height] }, height: 280, presented: 480 }), "Tries under an envelope");
     stage.read(at === undefined ? null : `Direction ${at.toFixed(2)}: target ${short(target(at))}, envelope ${short(c * q(at))}; a try is kept with probability ${Math.min(target(at) / (c * q(at)), 1).toFixed(2)}.`);
     const bias = integral((x) => Math.max(target(x) - c * q(x), 0));
     stage.say(`${kept.length} of ${tries} tries are kept (1 / c = ${short(1 / c)})${bias > 1e-3 ? `; ${short(100 * bias)} % of the target exceeds the envelope and is lost` : ""}.`);
@@ -150,7 +150,7 @@ export const resampling = (stage: Stage) => {
     const height = Math.max(10, Math.ceil(top(target)));
     stage.svg(plot([
       { name: "picked", kind: "estimate", points: bars, as: "bars" }, { name: "candidates", kind: "light", points: line(400, q) }, { name: "target", kind: "product", points: line(400, target) }, marker(at, height),
-    ], { x: { name: "direction, drag the lobe", range: [0, 1] }, y: { name: "density", range: [0, height] }, height: 260 }), "A histogram of the resampled directions");
+    ], { x: { name: "direction, drag the lobe", range: [0, 1] }, y: { name: "density", range: [0, height] }, height: 260, presented: 480 }), "A histogram of the resampled directions");
     stage.read(at === undefined ? null : `Direction ${at.toFixed(2)}: candidates’ density ${short(q(at))}, target ${short(target(at))}, picked ${short(bars[Math.min(Math.floor(at * bins), bins - 1)][1])}; a candidate here has weight ${short(target(at) / q(at))}.`);
     // The expected distance of a histogram of as many samples of the target itself.
     const noise = 0.5 * bars.reduce((sum, [x]) => { const p = inBin(x) / bins; return sum + Math.sqrt(2 * p * (1 - p) / (Math.PI * picks)); }, 0);
@@ -191,9 +191,9 @@ export const biasAndVariance = (stage: Stage) => {
     const shadow = plot([
       { name: "visibility V", kind: "visibility", points: [[0, 1], [edge(), 1], [edge(), 0], [1, 0]] },
       { name: `${n} fixed lights`, kind: "light", points: lights, as: "dots" }, marker(over?.frame === 0 ? over.x : undefined, 1.1),
-    ], { x: { name: "light, drag the shadow’s edge", range: [0, 1] }, y: { name: "V", range: [0, 1.1], ticks: [0, 1] }, height: 130 });
+    ], { x: { name: "light, drag the shadow’s edge", range: [0, 1] }, y: { name: "V", range: [0, 1.1], ticks: [0, 1] }, height: 130, presented: 150 });
     const error = plot([{ name: "random samples", kind: "estimate", points: noisy }, { name: "fixed lights", kind: "light", points: fixed }, { name: "", kind: "light", as: "dots", points: n > 1 ? [[n, Math.max(Math.abs(ofLights(n) - edge()), LEAST_ERROR)]] : [] }],
-      { x: { name: "number of samples or lights N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "absolute error", log: true, range: [LEAST_ERROR, 1] } });
+      { x: { name: "number of samples or lights N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "absolute error", log: true, range: [LEAST_ERROR, 1] }, presented: 320 });
     stage.svg(shadow + error, "The lights that a shadow’s edge leaves visible, and the error of random samples and fixed lights");
     const k = over?.frame === 1 ? COUNTS.findLastIndex((c) => c <= over.x * 1.01) : -1;
     stage.read(k >= 0 ? `N = ${COUNTS[k]}: random samples ${short(noisy[k][1])}, fixed lights ${short(fixed[k][1])}.` : over?.frame === 0 ? `At ${over.x.toFixed(2)}, V = ${f(over.x)}; the visible share is ${edge().toFixed(3)}.` : null);
