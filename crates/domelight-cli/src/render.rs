@@ -31,7 +31,7 @@ use domelight_lab::job::Job;
 use domelight_lab::job::value::{Rotation, Size, Text};
 use domelight_lab::names::file_name;
 use domelight_lab::scene::PreparedScene;
-use domelight_lab::{Stopwatch, refuse_repeating_points};
+use domelight_lab::{Stopwatch, refuse_repeating_points, warn_of_rare_acceptance};
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
@@ -149,8 +149,10 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         return Err(Interrupted(text).into());
     }
     let render = watch.lap();
-    if let Some(reason) = domelight_lab::black::reason(&rendering.layers) {
-        warn(quiet, reason);
+    let rare = warn_of_rare_acceptance(spec, &rendering.counts);
+    let reason = || domelight_lab::black::reason(&rendering.layers).map(str::to_owned);
+    if let Some(text) = rare.or_else(reason) {
+        warn(quiet, &text);
     }
 
     if turntable.is_none()

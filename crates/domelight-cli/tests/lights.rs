@@ -3,6 +3,8 @@
 use crate::common;
 
 use common::{domelight, done, json, load, stderr, stdout, write_exr};
+use domelight::environment::Environment;
+use domelight::rig::{VarianceMinimization, variance_minimization};
 use domelight::{Rgb, RgbImage};
 use serde_json::Value;
 use std::path::Path;
@@ -298,6 +300,7 @@ fn bad_usage_is_exit_code_2() {
         (&["sun.exr", "--preview", "rig.exr"], ".png"),
         (&["sun.exr", "-n", "4", "--keep-residual", "dome.exr"], "nothing is left"),
         (&["sun.exr", "--method", "k-means"], "variance-minimization"),
+        (&["sun.exr", "--method", "k-means"], "variance-minimization:2009"),
     ] {
         let output = domelight(&folder, &[&["lights"], arguments].concat());
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
@@ -305,6 +308,35 @@ fn bad_usage_is_exit_code_2() {
         assert_eq!(stdout(&output), "");
     }
     assert!(!Path::new("rig.tiff").exists());
+}
+
+/// The poster cuts rectangles on the map; the default refines cells on the sphere. Both keep all light.
+#[test]
+fn the_rule_of_2009_is_a_method_of_its_own() {
+    let folder = probes();
+    let of = |method: &str| {
+        json(&domelight(&folder, &["lights", "sun.exr", "-n", "8", "--json", "--method", method]))
+    };
+    let (poster, refined) = (of("variance-minimization:2009"), of("variance-minimization"));
+    assert_eq!(poster["method"], "variance-minimization:2009");
+    for channel in 0..3 {
+        let [a, b] = [&poster, &refined].map(|rig| rig["irradiance"][channel].as_f64().unwrap());
+        // Up to the rounding of eight lights.
+        assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+    }
+    assert_ne!(poster["lights"], refined["lights"]);
+
+    let environment = Environment::load(folder.path().join("sun.exr")).expect("a map");
+    let rig = variance_minimization(&environment, 8, VarianceMinimization::poster()).expect("lit");
+    let directions = |rig: &Value| -> Vec<Value> {
+        rig["lights"].as_array().unwrap().iter().map(|l| l["direction"].clone()).collect()
+    };
+    let expected: Vec<Value> =
+        rig.lights.iter().map(|l| serde_json::json!(l.direction.to_array())).collect();
+    let mut found = directions(&poster);
+    assert_eq!(found.len(), expected.len());
+    found.retain(|direction| !expected.contains(direction));
+    assert!(found.is_empty(), "{found:?}");
 }
 
 #[test]

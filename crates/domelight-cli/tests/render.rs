@@ -320,6 +320,28 @@ fn standard_output_takes_a_picture() {
     refused(&render(&folder, &["--json", "-o", "-"]), 2, &["standard output"]);
 }
 
+/// A sun a million times as bright as the sky: no try of the BRDF is accepted in proportion to its light.
+#[test]
+fn rejection_that_accepts_nothing_is_warned_of() {
+    let folder = folder();
+    let mut sky = RgbImage::filled(64, 32, Rgb::splat(0.01));
+    sky.pixels[10 * 64 + 40] = Rgb::splat(1e6);
+    write_exr(&folder.path().join("sun.exr"), &sky, None);
+    let sphere = |strategy: &str, env: &str| {
+        let scene = ["render", "sphere", "--env", env, "--size", "16x16", "--spp", "1"];
+        let output =
+            domelight(&folder, &[&scene[..], &["--strategy", strategy, "-o", "x.pfm"]].concat());
+        succeeded(&output);
+        stderr(&output).to_owned()
+    };
+    let text = sphere("rejection:8:proposal=brdf", "sun.exr");
+    assert!(text.contains("rejection accepted"), "{text}");
+    assert!(text.contains("proposal=environment"), "{text}");
+    assert_eq!(text.matches("the model is").count(), 1, "{text}");
+    let text = sphere("rejection:8:proposal=environment", "sun.exr");
+    assert!(!text.contains("rejection accepted"), "{text}");
+}
+
 #[test]
 fn flags_that_contradict_are_usage_errors() {
     let folder = folder();

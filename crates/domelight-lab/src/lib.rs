@@ -48,7 +48,7 @@ mod strategy;
 pub mod svg;
 mod usage;
 
-pub use acceptance::{Acceptance, count_tries};
+pub use acceptance::{Acceptance, count_tries, warn_of_rare_acceptance};
 pub use error::{At, Error};
 pub use host::{Host, Silent, WorkProgress};
 pub use strategy::{NamedStrategy, refuse_repeating_points};

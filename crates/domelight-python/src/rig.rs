@@ -334,8 +334,9 @@ type Pickled<'py> = (
 /// n : int or None, default 64
 ///     Total number of lights, including compact sources; with None, everything that `sun` and `lamps` do not take is
 ///     the rig's residual.
-/// method : {'variance-minimization', 'median-cut'}, default 'variance-minimization'
-///     The method that divides the map.
+/// method : {'variance-minimization', 'variance-minimization:2009', 'median-cut'}, default 'variance-minimization'
+///     The method that divides the map: regions of small variance on the sphere, the rule of Viriyothai & Debevec 2009
+///     on the map, or regions of equal energy.
 /// sun : bool, default False
 ///     First extract the sun as one light.
 /// lamps : int, default 0
@@ -371,10 +372,13 @@ pub(crate) fn lights(
     let py = env.py();
     let method = match method {
         "variance-minimization" => Method::VarianceMinimization(VarianceMinimization::default()),
+        "variance-minimization:2009" => {
+            Method::VarianceMinimization(VarianceMinimization::poster())
+        }
         "median-cut" => Method::MedianCut(MedianCut::default()),
         _ => {
             return Err(bad_value(format!(
-                "method is {method:?}; it must be 'variance-minimization' or 'median-cut'"
+                "method is {method:?}; it must be 'variance-minimization', 'variance-minimization:2009' or 'median-cut'"
             )));
         }
     };

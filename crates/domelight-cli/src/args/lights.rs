@@ -104,8 +104,13 @@ fn format() -> impl TypedValueParser<Value = Format> {
 /// How to divide a map into regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum MethodName {
-    /// Regions of small variance (Viriyothai & Debevec 2009, on the sphere)
+    /// Regions of small variance on the sphere: the sum of both halves' variances is minimized, the worst region is cut
+    /// first, and regions are then merged and refined into cells
     VarianceMinimization,
+    /// The rule of the poster (Viriyothai & Debevec 2009): rectangles, cut level by level so that the larger of both
+    /// halves' variances on the map is least
+    #[value(name = "variance-minimization:2009")]
+    Poster,
     /// Regions of equal energy (Debevec 2005)
     MedianCut,
 }
@@ -115,6 +120,7 @@ impl MethodName {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::VarianceMinimization => "variance-minimization",
+            Self::Poster => "variance-minimization:2009",
             Self::MedianCut => "median-cut",
         }
     }
@@ -126,6 +132,7 @@ impl From<MethodName> for Method {
             MethodName::VarianceMinimization => {
                 Self::VarianceMinimization(VarianceMinimization::default())
             }
+            MethodName::Poster => Self::VarianceMinimization(VarianceMinimization::poster()),
             MethodName::MedianCut => Self::MedianCut(MedianCut::default()),
         }
     }
