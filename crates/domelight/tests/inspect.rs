@@ -141,6 +141,33 @@ fn a_penumbra() {
     assert!(found[0].diagnosis(&found).to_string().contains("partly hidden"));
 }
 
+/// Half of a small lamp is hidden from the whole pixel, and brdf sampling finds it with one ray in a hundred. A ray that
+/// does has V = 0 or 1, each with the probability 1/2, so directions and the penumbra have half of the variance each.
+#[test]
+fn a_penumbra_of_a_lamp_that_is_rarely_found() {
+    let lamp = map(|_, y| if y < 1 { 100.0 } else { 0.0 });
+    let cards = vec![card([-9.0, 9.0], 0.0, 9.0), card([0.0, 9e3], 900.0, 9e3)];
+    let pixel = Pixel::new(cards, "diffuse:0.5", 0.01, lamp);
+    let mut off = Vec::new();
+    for seed in 0..30 {
+        let found = pixel.inspect(seed, &["brdf"]);
+        // Only rays toward the lamp are traced.
+        let p = found[0].rays_per_sample;
+        assert!(p < 0.02, "{p}");
+        let share = |is: fn(&Cause) -> bool| -> f64 {
+            let shares = found[0].shares.iter().filter(|share| is(&share.cause));
+            shares.map(|share| share.share * found[0].variance).sum()
+        };
+        let directions = share(|cause| matches!(cause, Cause::Directions(_)));
+        let penumbra = share(|cause| matches!(cause, Cause::Penumbra(_)));
+        // One ray: its variance is p/2 − p²/4, and that of directions p/4 − p²/4, in squares of its contribution.
+        let expected = 0.5 * (1.0 - p) / (1.0 - 0.5 * p);
+        off.push([directions - expected * (directions + penumbra)]);
+    }
+    let test = ZTest { suite: Suite::of(1), ..ZTest::default() };
+    test.against("directions", &off, [0.0]).unwrap();
+}
+
 #[test]
 fn the_edge_of_a_shadow() {
     // A blocker close above hides all of a small sun from half of the pixel.

@@ -6,10 +6,14 @@
 //! shares sum to 1. Each part is split once more, tᵣ = v uᵣ + (tᵣ − v uᵣ), where uᵣ is the same part with all rays
 //! unoccluded and v = E\[tᵣ\] / E\[uᵣ\]: the first term varies with light, reflectance and densities, the second with
 //! visibility. A cause with a negative share offsets others.
+//!
+//! Where a strategy's rays seldom reach a source, most points have at most one of them, whose visibility is 0 or 1. So would
+//! be v, and nothing would be a penumbra. There, v is that of multiple importance sampling.
 
 use std::fmt;
 
 use super::CameraSample;
+use super::KnownLight;
 use super::regions::{Regions, Source, SourceKind};
 use super::replicates::{N_PIXELS, Replicates, SAMPLES_PER_PIXEL};
 
@@ -117,11 +121,17 @@ impl Decomposition {
         samples: &[CameraSample],
         replicates: &Replicates,
         regions: &Regions,
-        light: &[f64],
+        known: &KnownLight,
     ) -> Self {
+        let light = &known.by_source;
         let means = Means::of(samples, replicates);
         let mut shares = means.between(regions.sources());
-        for Share { cause, share } in within(samples, replicates, &means, regions.sources()) {
+        let visible = |point: usize, part: usize| {
+            let own = || ratio(means.seen[point][part], means.unoccluded[point][part]);
+            let of_rays = replicates.visible(point, part);
+            of_rays.or_else(|| known.visible(point, part)).unwrap_or_else(own)
+        };
+        for Share { cause, share } in within(samples, replicates, visible, regions.sources()) {
             // What is known without rays differs between camera samples and between passes.
             match shares.iter_mut().find(|other| other.cause == cause) {
                 Some(other) => other.share += share,
@@ -301,12 +311,12 @@ impl Means {
     }
 }
 
-/// The variance of t given p, averaged over the pixel, by causes: that of a pixel's mean over 16 camera samples times
+/// The variance of t given p, averaged over the pixel, by causes; `visible` has v of each point and part. It is that of a pixel's mean over 16 camera samples times
 /// 16, so that directions which are well distributed over them count as such.
 fn within(
     samples: &[CameraSample],
     replicates: &Replicates,
-    means: &Means,
+    visible: impl Fn(usize, usize) -> f64,
     sources: &[Source],
 ) -> Vec<Share> {
     let &Replicates { n_parts, n_passes, .. } = replicates;
@@ -324,10 +334,10 @@ fn within(
         let sums: Vec<f64> =
             (0..n_passes).map(|k| (0..n_parts).map(|part| part_of(k, part)).sum()).collect();
         for part in 0..n_parts {
-            let visible = |i: usize| ratio(means.seen[i][part], means.unoccluded[i][part]);
+            let visible: Vec<f64> = points.clone().map(|i| visible(i, part)).collect();
             seen[part] += covariance(&sums, |k| part_of(k, part));
             shape[part] += covariance(&sums, |k| {
-                mean_of(k, &|k, i| visible(i) * replicates.unoccluded(k, i, part))
+                mean_of(k, &|k, i| visible[i - points.start] * replicates.unoccluded(k, i, part))
             });
         }
     }

@@ -94,11 +94,35 @@ pub struct Inspector<'a> {
     /// The hit nearest to the pixel's center.
     representative: Option<ShadingPoint>,
     regions: Regions,
-    /// Luminance that each source adds to the pixel, by multiple importance sampling: it reveals a strategy that
-    /// misses rare light.
-    light: Vec<f64>,
+    light: KnownLight,
     /// The longest extent of the scene, in its units.
     extent: f32,
+}
+
+/// What multiple importance sampling knows of the light, for strategies that find some of it rarely.
+#[derive(Debug, Default)]
+struct KnownLight {
+    /// Luminance that each source adds to the pixel; empty if nothing is known.
+    by_source: Vec<f64>,
+    /// The visible share of what each source adds to each hit, hit by hit; `None` where few rays found the source.
+    visible: Vec<Option<f64>>,
+}
+
+impl KnownLight {
+    fn of(replicates: &Replicates) -> Self {
+        let n_sources = replicates.n_parts - 1;
+        let of_point = |point| (0..n_sources).map(move |part| replicates.visible(point, part));
+        Self {
+            by_source: replicates.light_by_source(N_SAMPLES),
+            visible: (0..replicates.n_points).flat_map(of_point).collect(),
+        }
+    }
+
+    /// The visible share of what a source adds to a hit, if it is known.
+    fn visible(&self, point: usize, part: usize) -> Option<f64> {
+        let n_sources = self.by_source.len();
+        (part < n_sources).then(|| self.visible[point * n_sources + part]).flatten()
+    }
 }
 
 /// A camera sample of the pixel.
@@ -185,14 +209,14 @@ impl<'a> Inspector<'a> {
             representative: representative.or_else(first),
             samples,
             regions: Regions::of(environment),
-            light: Vec::new(),
+            light: KnownLight::default(),
             extent: scene.extent(),
         };
-        inspector.light = inspector.light_by_source();
+        inspector.light = inspector.known_light();
         Ok(inspector)
     }
 
-    fn light_by_source(&self) -> Vec<f64> {
+    fn known_light(&self) -> KnownLight {
         let mis = MultipleImportanceSampling::new(
             self.environment,
             LightTable::Full,
@@ -200,8 +224,7 @@ impl<'a> Inspector<'a> {
             4,
             4,
         );
-        let replicates = mis.map(|mis| self.replicates(&mis));
-        replicates.map_or(Vec::new(), |replicates| replicates.light_by_source(self.samples.len()))
+        mis.map_or_else(|_| KnownLight::default(), |mis| KnownLight::of(&self.replicates(&mis)))
     }
 
     /// A summary of what the pixel shows.

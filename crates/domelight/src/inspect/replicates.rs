@@ -34,6 +34,8 @@ pub(super) struct Replicates {
     seen: Vec<f64>,
     /// The same with all rays free.
     unoccluded: Vec<f64>,
+    /// Rays of all replicates, by point and part.
+    rays_of_points: Vec<u32>,
     /// Rays of all replicates toward each source.
     pub(super) rays: Vec<u64>,
     /// V of them, summed.
@@ -63,6 +65,7 @@ impl Replicates {
             n_passes: N_PASSES,
             seen: vec![0.0; n_values],
             unoccluded: vec![0.0; n_values],
+            rays_of_points: vec![0; points.len() * n_parts],
             rays: vec![0; n_sources],
             free: vec![0.0; n_sources],
         };
@@ -84,6 +87,7 @@ impl Replicates {
             let seen = &mut replicates.seen[own.clone()];
             let unoccluded = &mut replicates.unoccluded[own];
             let (rays, free) = (&mut replicates.rays, &mut replicates.free);
+            let rays_of_points = &mut replicates.rays_of_points;
             let radiance = estimator.estimate(&pass, &tile, |asked: &Contributions, visible| {
                 trace(&points, &asked.point, &asked.wi, visible);
                 for (i, &v) in visible.iter().enumerate() {
@@ -93,6 +97,7 @@ impl Replicates {
                     let weight = f64::from((asked.weight[i] * throughput).luminance()) * unit;
                     unoccluded[at] += weight;
                     seen[at] += weight * f64::from(v);
+                    rays_of_points[at] += 1;
                     rays[source] += 1;
                     free[source] += f64::from(v);
                 }
@@ -119,6 +124,18 @@ impl Replicates {
     /// With all rays free.
     pub(super) fn unoccluded(&self, replicate: usize, point: usize, part: usize) -> f64 {
         self.unoccluded[(replicate * self.n_points + point) * self.n_parts + part]
+    }
+
+    /// The visible share of what a source adds to a point; `None` if few rays found it.
+    pub(super) fn visible(&self, point: usize, part: usize) -> Option<f64> {
+        /// A share of k rays that are 0 or 1 has a variance of up to 1/(4k), and its square is by as much too large.
+        const ENOUGH: u32 = 64;
+        if self.rays_of_points[point * self.n_parts + part] < ENOUGH {
+            return None;
+        }
+        let sum = |value: &dyn Fn(usize) -> f64| (0..self.n_passes).map(value).sum::<f64>();
+        let unoccluded = sum(&|k| self.unoccluded(k, point, part));
+        (unoccluded != 0.0).then(|| sum(&|k| self.seen(k, point, part)) / unoccluded)
     }
 
     /// Mean over `n_samples` camera samples, hits and misses, of what each source adds.
