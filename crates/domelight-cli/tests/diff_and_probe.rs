@@ -288,7 +288,7 @@ fn a_layer_of_a_map_that_has_none_is_warned_of() {
     assert!(
         stderr(&of_file).contains("map.hdr: only OpenEXR files have layers; 'sky' is not used")
     );
-    let of_builtin = "studio is built in: its layer and mapping cannot be chosen";
+    let of_builtin = "studio is built in: its layer, mapping, faces and window cannot be chosen";
     assert!(stderr(&asked(&[&render[..], &["studio"]].concat())).contains(of_builtin));
     let probe = domelight(&folder, &["probe", "studio", "--layer", "sky"]);
     assert!(stderr(&probe).contains(of_builtin), "{}", stderr(&probe));

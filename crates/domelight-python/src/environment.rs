@@ -169,7 +169,7 @@ impl Environment {
         let mapping: Option<Mapping> =
             mapping.map(|m| m.parse().map_err(|e| from_source(&e))).transpose()?;
         let name = path.display().to_string();
-        let options = ProbeOptions { mapping, layer, strict, max_memory: None };
+        let options = ProbeOptions { mapping, layer, strict, ..ProbeOptions::default() };
         let map = load_map(py, path, options)?;
         Self::build(py, map, orientation, scale, name)
     }

@@ -1,8 +1,10 @@
 //! Pictures and probes in files: round trips, every variant of every format, damaged files.
 #![cfg(feature = "io")]
 
-use domelight::environment::io::{ProbeError, ProbeOptions, SanitizeReport, load_probe, sanitize};
-use domelight::environment::mapping::{CubeLayout, EnvmapKind, Mapping};
+use domelight::environment::io::{
+    ProbeError, ProbeOptions, SanitizeReport, Window, load_probe, probe_from_picture, sanitize,
+};
+use domelight::environment::mapping::{CubeLayout, EnvmapKind, Mapping, from_lat_long};
 use domelight::picture::exr::{ExrLayers, text_attributes};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::picture::{
@@ -934,7 +936,7 @@ fn texels_that_are_no_radiance_are_named_or_repaired() {
 fn data_windows_stand_in_display_windows_that_are_maps() {
     let folder = tempfile::tempdir().unwrap();
     let image = smooth(12, 5);
-    let probe = |data: &RgbImage, origin: (i32, i32), display: (usize, usize)| {
+    let probe_in = |data: &RgbImage, origin: (i32, i32), display: (usize, usize), window| {
         let channels = rgb_channels(data, "", SampleType::F32);
         let attributes = LayerAttributes {
             layer_position: Vec2(origin.0, origin.1),
@@ -950,8 +952,9 @@ fn data_windows_stand_in_display_windows_that_are_maps() {
         file.attributes.display_window = exr::meta::attribute::IntegerBounds::new((3, -2), display);
         let path = folder.path().join("p.exr");
         file.write().to_file(&path).unwrap();
-        load_probe(&path, &ProbeOptions::default()).unwrap()
+        load_probe(&path, &ProbeOptions { window, ..ProbeOptions::default() }).unwrap()
     };
+    let probe = |data: &RgbImage, origin, display| probe_in(data, origin, display, None);
     let cropped = probe(&image, (5, 0), (16, 8));
     assert_eq!(cropped.file_size, (16, 8));
     assert_eq!(cropped.image.get(2, 2), image.get(0, 0));
@@ -964,11 +967,56 @@ fn data_windows_stand_in_display_windows_that_are_maps() {
     assert_eq!((as_is.image, as_is.warnings.len()), (smooth(16, 8), 0));
     let either = probe(&smooth(20, 10), (1, -3), (16, 8));
     assert_eq!((either.image, either.file_size), (smooth(20, 10), (20, 10)));
-    assert!(either.warnings[0].ends_with("the data window is read as the whole map"));
+    let warning = "the data window is read as the whole map (--window display reads the other, of render: --env-window)";
+    assert!(either.warnings[0].ends_with(warning), "{:?}", either.warnings);
+    // The same file by an option.
+    let data = probe_in(&smooth(20, 10), (1, -3), (16, 8), Some(Window::Data));
+    assert_eq!((data.file_size, data.warnings.len()), ((20, 10), 0));
+    let display = probe_in(&smooth(20, 10), (1, -3), (16, 8), Some(Window::Display));
+    assert_eq!((display.file_size, display.warnings.len()), ((16, 8), 0));
+    assert_eq!(display.image.get(0, 0), smooth(20, 10).get(2, 1));
     let neither = probe(&smooth(21, 9), (5, 3), (30, 17));
     assert_eq!(neither.image, smooth(21, 9));
-    assert!(neither.warnings[0].ends_with("the data window is read as the whole map"));
+    assert!(neither.warnings[0].ends_with(warning), "{:?}", neither.warnings);
     assert!(neither.warnings[1].contains("21x9 texels are stretched"), "{:?}", neither.warnings);
+}
+
+/// Strips and crosses of other programs, and pictures without faces.
+#[test]
+fn faces_in_another_order_are_a_map() {
+    let probe = smooth(64, 32);
+    let n = 8;
+    let strip = from_lat_long(&probe, Mapping::Cube(CubeLayout::StripHorizontal), (6 * n, n));
+    let picture = |image: &RgbImage| {
+        let mut bytes = Vec::new();
+        pfm::encode(image, &mut bytes).unwrap();
+        read_bytes(&bytes, "p.pfm", &ReadOptions::default()).unwrap()
+    };
+    let load = |image: &RgbImage, faces: Option<&str>, mapping| {
+        let faces = faces.map(|faces| faces.parse().unwrap());
+        let options = ProbeOptions { faces, mapping, ..ProbeOptions::default() };
+        probe_from_picture(picture(image), "p.pfm", &options)
+    };
+    let expected = load(&strip, None, None).unwrap();
+    // Right, left, up, down, back, front in the order front, right, back, left, up, down.
+    let order = [5, 0, 4, 1, 2, 3];
+    let other = RgbImage::from_fn(6 * n, n, |x, y| strip.get(order[x / n] * n + x % n, y));
+    let found = load(&other, Some("F,R,B,L,U,D"), None).unwrap();
+    assert_eq!((&found.image, found.warnings.len()), (&expected.image, 0));
+    // A cross with its lowest face upright.
+    let layout = CubeLayout::CrossVertical;
+    let cross = from_lat_long(&probe, Mapping::Cube(layout), (3 * n, 4 * n));
+    let upright = RgbImage::from_fn(3 * n, 4 * n, |x, y| match (x / n, y / n) {
+        (1, 3) => cross.get(3 * n - 1 - x, 7 * n - 1 - y),
+        _ => cross.get(x, y),
+    });
+    assert_ne!(upright, cross);
+    let found = load(&upright, Some("U,L,F,R,D,B"), Some(Mapping::Cube(layout))).unwrap();
+    assert_eq!(found.image, load(&cross, None, Some(Mapping::Cube(layout))).unwrap().image);
+    for mapping in [None, Some(Mapping::LatLong)] {
+        let error = load(&probe, Some("F,R,B,L,U,D"), mapping).unwrap_err().to_string();
+        assert!(error.contains("64x32") && error.contains("has no faces"), "{error}");
+    }
 }
 
 #[test]

@@ -17,7 +17,8 @@ use crate::output::PicturePath;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Arg, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
 use domelight::environment::convention::Convention;
-use domelight::environment::mapping::Mapping;
+use domelight::environment::io::Window;
+use domelight::environment::mapping::{CubeFaces, Mapping};
 use domelight::picture::tone::ToneCurve;
 use domelight_lab::job::Tone;
 use domelight_lab::job::value::{Choice, Count};
@@ -365,6 +366,13 @@ pub(crate) struct ProbeArguments {
     /// Mapping of the input file [default: inferred from its shape].
     #[arg(long, value_parser = mapping())]
     pub(crate) mapping: Option<Mapping>,
+    /// Faces of an unfolded cube in reading order, with degrees by which they are turned clockwise, such as F,R,B180,L,U,D
+    /// (front, right, back, left, up, down) [default: as in the layout].
+    #[arg(long, value_name = "LIST")]
+    pub(crate) faces: Option<CubeFaces>,
+    /// Window of an OpenEXR file that is the map [default: the data window if it has the shape of a map].
+    #[arg(long)]
+    pub(crate) window: Option<Choice<Window>>,
     /// Refuse values that are otherwise repaired with a warning: negative, NaN and infinite ones.
     #[arg(long)]
     pub(crate) strict: bool,

@@ -114,9 +114,15 @@ fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
         let image = builtin.image(rows as usize);
         let (mapping, file_size) = (Mapping::LatLong, (image.width, image.height));
         let sanitized = SanitizeReport::default();
-        let chosen = arguments.layer.is_some() || arguments.mapping.is_some();
-        let warning =
-            || format!("{} is built in: its layer and mapping cannot be chosen", builtin.name());
+        let ProbeArguments { layer, mapping: of_file, faces, window, .. } = arguments;
+        let chosen =
+            [layer.is_some(), of_file.is_some(), faces.is_some(), window.is_some()].contains(&true);
+        let warning = || {
+            format!(
+                "{} is built in: its layer, mapping, faces and window cannot be chosen",
+                builtin.name()
+            )
+        };
         let warnings = chosen.then(warning).into_iter().collect();
         return Ok(LoadedProbe {
             image,
@@ -130,6 +136,8 @@ fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
     files::reads(&arguments.probe)?;
     let options = ProbeOptions {
         mapping: arguments.mapping,
+        faces: arguments.faces,
+        window: arguments.window.map(|Choice(window)| window),
         layer: arguments.layer.clone(),
         strict: arguments.strict,
         max_memory: memory::left(),

@@ -7,8 +7,8 @@ use clap::Args;
 use domelight::RgbImage;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::convention::Convention;
-use domelight::environment::io::{ProbeError, ProbeOptions};
-use domelight::environment::mapping::Mapping;
+use domelight::environment::io::{ProbeError, ProbeOptions, Window};
+use domelight::environment::mapping::{CubeFaces, Mapping};
 use domelight::environment::{Environment, UpAxis};
 use domelight::picture::{PictureError, PictureErrorKind};
 use domelight::scene::{EnvironmentSettings, EnvironmentSource, LoadError, SceneDescription};
@@ -48,6 +48,13 @@ pub struct Light {
     /// Layout of the map [default: inferred from the shape and the attributes of the file]
     #[arg(id = "light.mapping", long = "env-mapping", value_name = "MAPPING")]
     pub mapping: Option<Choice<Mapping>>,
+    /// Faces of an unfolded cube in reading order, with degrees by which they are turned clockwise, such as F,R,B180,L,U,D
+    /// (front, right, back, left, up, down) [default: as in the layout]
+    #[arg(id = "light.faces", long = "env-faces", value_name = "LIST")]
+    pub faces: Option<Text<CubeFaces>>,
+    /// Window of an OpenEXR map that is the map [default: the data window if it has the shape of a map]
+    #[arg(id = "light.window", long = "env-window", value_name = "WINDOW")]
+    pub window: Option<Choice<Window>>,
     /// Layer of an OpenEXR map
     #[arg(id = "light.layer", long = "env-layer", value_name = "NAME")]
     pub layer: Option<String>,
@@ -109,9 +116,10 @@ impl Light {
                     Some(referrer) => Error::Usage(format!("{referrer}: {error}")),
                     None => Error::Usage(error.to_string()),
                 })?;
-                if self.layer.is_some() || self.mapping.is_some() {
+                let chosen = [self.mapping.is_some(), self.faces.is_some(), self.window.is_some()];
+                if self.layer.is_some() || chosen.contains(&true) {
                     host.warn(&format!(
-                        "{name} is built in: its layer and mapping cannot be chosen"
+                        "{name} is built in: its layer, mapping, faces and window cannot be chosen"
                     ));
                 }
                 let rows = u64::from(self.rows.get());
@@ -123,6 +131,8 @@ impl Light {
         };
         let options = ProbeOptions {
             mapping: self.mapping.map(|Choice(mapping)| mapping),
+            faces: self.faces.map(|Text(faces)| faces),
+            window: self.window.map(|Choice(window)| window),
             layer: self.layer.clone(),
             strict: self.strict,
             max_memory: host.memory_left(),

@@ -362,7 +362,7 @@ mod tests {
     }
 
     /// Values of every option, by the path of its field.
-    const VALUES: [(&str, &[&str]); 34] = [
+    const VALUES: [(&str, &[&str]); 36] = [
         ("scene", &["robot.glb", "a b.ply", "-x.obj", "statue"]),
         ("file.scene", &["Scene", "0"]),
         ("file.animation", &["walk", "1"]),
@@ -374,6 +374,8 @@ mod tests {
         ("light.exposure", &["-1.5", "2"]),
         ("light.up", &["y", "z"]),
         ("light.mapping", &["octahedral", "lat-long"]),
+        ("light.faces", &["F,R,B180,L,U,D"]),
+        ("light.window", &["data", "display"]),
         ("light.layer", &["left.R"]),
         ("light.rows", &["1", "64", "16384"]),
         ("light.strict", &["true"]),

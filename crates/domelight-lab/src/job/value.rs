@@ -11,6 +11,7 @@ use clap::builder::{
 };
 use domelight::environment::UpAxis;
 use domelight::environment::convention::Convention;
+use domelight::environment::io::Window;
 use domelight::environment::mapping::Mapping;
 use domelight::math::DVec3;
 use domelight::picture::tone::ToneCurve;
@@ -513,6 +514,16 @@ impl Named for SamplerKind {
 }
 
 impl Named for Filter {
+    fn all() -> Vec<Self> {
+        Self::ALL.to_vec()
+    }
+
+    fn name(self) -> &'static str {
+        self.name()
+    }
+}
+
+impl Named for Window {
     fn all() -> Vec<Self> {
         Self::ALL.to_vec()
     }

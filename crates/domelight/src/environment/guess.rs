@@ -102,7 +102,9 @@ fn of_cross(image: &RgbImage, layout: CubeLayout) -> Guess {
         && border(image, (face..2 * face).map(|x| [0, 1, 2, 3].map(|i| [x, 3 * face + i - 2])))
             > BROKEN;
     let doubt = is_upright.then(|| {
-        "its lowest face does not continue the one above, as if it were upright: turn it by 180 degrees".to_owned()
+        "its lowest face does not continue the one above, as if it were upright: if so, read it with --faces U,L,F,R,D,B (of \
+         render: --env-faces)"
+            .to_owned()
     });
     Guess { mapping, doubt }
 }
@@ -129,7 +131,7 @@ fn of_strip(image: &RgbImage, layout: CubeLayout) -> Guess {
         )),
         [first @ .., fourth, _] if is_continuous(&first[..3]) && *fourth > CONTINUOUS => Some(
             "its first four faces continue one another: they may be in the order front, right, back, left, up, down, but are \
-             read as +X, −X, +Y, −Y, +Z, −Z"
+             read as +X, −X, +Y, −Y, +Z, −Z; for that order, say --faces F,R,B,L,U,D (of render: --env-faces)"
                 .to_owned(),
         ),
         _ => None,

@@ -7,7 +7,7 @@
 pub use super::guess::Guess;
 pub use super::repair::{OVERFLOWED, SanitizeReport, sanitize};
 
-use super::mapping::{Mapping, ShapeError, to_lat_long};
+use super::mapping::{CubeFaces, Mapping, ShapeError, to_lat_long};
 use super::repair::finite_light;
 use crate::memory;
 use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
@@ -19,12 +19,39 @@ use std::path::Path;
 pub struct ProbeOptions {
     /// The mapping; by default guessed, see [`Guess`].
     pub mapping: Option<Mapping>,
+    /// The order and the turns of a cube's faces in the picture; by default those of its layout.
+    pub faces: Option<CubeFaces>,
+    /// The window of an OpenEXR file that is the map, where data and display window differ; by default the data window if
+    /// it has the shape of a map, otherwise the display window if that has.
+    pub window: Option<Window>,
     /// The OpenEXR layer; see [`ReadOptions::layer`].
     pub layer: Option<String>,
     /// Whether to reject negative and non-finite values instead of repairing them.
     pub strict: bool,
     /// The maximum memory for reading; see [`ReadOptions::max_memory`].
     pub max_memory: Option<u64>,
+}
+
+/// A window of an OpenEXR file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Window {
+    /// The texels that the file has.
+    Data,
+    /// The frame in which they lie.
+    Display,
+}
+
+impl Window {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Data, Self::Display];
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Data => "data",
+            Self::Display => "display",
+        }
+    }
 }
 
 /// A probe converted to the working map.
@@ -57,6 +84,20 @@ pub enum ProbeError {
         file: String,
         /// What does not fit.
         shape: ShapeError,
+    },
+    /// An order of faces for a picture that is no unfolded cube.
+    #[error(
+        "{file}: a picture of {width}x{height} in the mapping {mapping} has no faces; an unfolded cube has 4:3, 3:4, 6:1 or 1:6"
+    )]
+    NoFaces {
+        /// The file.
+        file: String,
+        /// The mapping.
+        mapping: Mapping,
+        /// The number of columns of the picture.
+        width: usize,
+        /// The number of rows of the picture.
+        height: usize,
     },
     /// Some values are not valid radiance.
     #[error(
@@ -121,27 +162,7 @@ pub fn probe_from_picture(
     if let Some(guessed) = &picture.guessed_layer {
         warnings.push(format!("{file}: {guessed}"));
     }
-    let shape = (picture.image.width, picture.image.height);
-    let windows = picture.window.map(|window| (window, [shape, window.display]));
-    let read_as = match windows.map(|(window, shapes)| (window, shapes.map(|s| is_map(s, options))))
-    {
-        None | Some((_, [true, false])) => None,
-        Some((window, [false, true])) => {
-            picture = in_display_window(&picture, window, options)
-                .map_err(|problem| problem.in_file(file))?;
-            Some(
-                "texels outside the data window are black, texels outside the display window are cropped",
-            )
-        }
-        Some(_) => Some("the data window is read as the whole map"),
-    };
-    if let (Some((_, shapes)), Some(treatment)) = (windows, read_as) {
-        let [data, display] = shapes.map(|(width, height)| format!("{width}x{height}"));
-        warnings.push(format!(
-            "{file}: the data window of {data} texels differs from the display window of \
-             {display}; {treatment}"
-        ));
-    }
+    warnings.extend(choose_window(&mut picture, file, options)?);
     let notes = picture.notes;
     let mut image = picture.image;
     if matches!(picture.format, Format::Png | Format::Jpeg) {
@@ -162,9 +183,12 @@ pub fn probe_from_picture(
     {
         warnings.push(format!("{file}: only OpenEXR files have layers; '{layer}' is not used"));
     }
-    let guess = match options.mapping {
-        Some(mapping) => Guess { mapping, doubt: None },
-        None => Guess::of(&image, picture.envmap),
+    let guess = match (options.mapping, options.faces) {
+        (Some(mapping), _) => Guess { mapping, doubt: None },
+        (None, Some(_)) => {
+            Guess { mapping: Mapping::guess(image.width, image.height, None), doubt: None }
+        }
+        (None, None) => Guess::of(&image, picture.envmap),
     };
     let mapping = guess.mapping;
     warnings.extend(guess.doubt.map(|doubt| format!("{file}: {doubt}")));
@@ -177,6 +201,13 @@ pub fn probe_from_picture(
     mapping
         .check_shape(image.width, image.height)
         .map_err(|shape| ProbeError::Shape { file: file.to_owned(), shape })?;
+    if let Some(faces) = options.faces {
+        let Mapping::Cube(layout) = mapping else {
+            let RgbImage { width, height, .. } = image;
+            return Err(ProbeError::NoFaces { file: file.to_owned(), mapping, width, height });
+        };
+        image = faces.arranged(&image, layout);
+    }
     if options.strict {
         require_radiance(&image, file)?;
     }
@@ -203,6 +234,46 @@ pub fn probe_from_picture(
     let image =
         if mapping == Mapping::LatLong { image } else { to_lat_long(&image, mapping, height) };
     Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings, notes })
+}
+
+/// Puts the picture into its display window, if that is the map. Returns a warning where nobody said which it is and
+/// either may be wrong.
+fn choose_window(
+    picture: &mut picture::Picture,
+    file: &str,
+    options: &ProbeOptions,
+) -> Result<Option<String>, ProbeError> {
+    let Some(window) = picture.window else { return Ok(None) };
+    let shapes = [(picture.image.width, picture.image.height), window.display];
+    let (chosen, treatment) = match (options.window, shapes.map(|shape| is_map(shape, options))) {
+        (Some(window), _) => (window, None),
+        (None, [true, false]) => (Window::Data, None),
+        (None, [false, true]) => (
+            Window::Display,
+            Some(
+                "texels outside the data window are black, texels outside the display window are cropped",
+            ),
+        ),
+        (None, [true, true] | [false, false]) => {
+            (Window::Data, Some("the data window is read as the whole map"))
+        }
+    };
+    if chosen == Window::Display {
+        *picture =
+            in_display_window(picture, window, options).map_err(|problem| problem.in_file(file))?;
+    }
+    let [data, display] = shapes.map(|(width, height)| format!("{width}x{height}"));
+    let other = match chosen {
+        Window::Data => Window::Display,
+        Window::Display => Window::Data,
+    };
+    Ok(treatment.map(|treatment| {
+        format!(
+            "{file}: the data window of {data} texels differs from the display window of {display}; {treatment} (--window {} \
+             reads the other, of render: --env-window)",
+            other.name()
+        )
+    }))
 }
 
 /// Whether a window has the shape of a map.

@@ -111,6 +111,11 @@ impl CubeLayout {
         self.faces().iter().find(|face| (face.column, face.row) == (column, row))
     }
 
+    /// The face that looks along an axis.
+    pub(super) fn face_toward(self, forward: Vec3) -> Option<&'static Face> {
+        self.faces().iter().find(|face| face.forward == forward)
+    }
+
     pub(super) fn direction(self, uv: Vec2) -> Option<Vec3> {
         let (columns, rows) = self.faces_across_and_down();
         let cell = uv * vec2(columns as f32, rows as f32);
