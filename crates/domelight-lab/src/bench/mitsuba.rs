@@ -187,7 +187,10 @@ impl Mitsuba {
         let image = pixels.iter().map(|&[r, g, b, _]| Rgb::new(r as f32, g as f32, b as f32));
         let image = RgbImage::new(self.size[0], self.size[1], image.collect());
         let alpha = pixels.iter().map(|p| p[3] as f32).collect();
-        Ok((ReferencePicture { image, alpha: Some(alpha), unoccluded: None }, time))
+        Ok((
+            ReferencePicture { image, alpha: Some(alpha), unoccluded: None, half_difference: None },
+            time,
+        ))
     }
 
     /// Its own converged picture of the case: its look-ups differ from ours, which are constant over a texel.

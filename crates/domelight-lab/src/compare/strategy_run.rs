@@ -150,7 +150,7 @@ impl StrategyRun<'_> {
     fn calibrate_rays(&self, rays: f64) -> Result<Calibration, Error> {
         const MOST_PILOTS: usize = 4;
         let each = self.pilot(4)?.rays() / 4.0;
-        let mut purchase = sample_count(rays, each, &format!("traces {each:.1} shadow rays"));
+        let mut purchase = count_for_rays(rays, each);
         let mut tried: Vec<(u32, f64)> = Vec::new();
         let off = |traced: f64| (traced / rays).ln().abs();
         let mut nearest: Option<(f64, Pilot)> = None;
@@ -164,16 +164,22 @@ impl StrategyRun<'_> {
             if nearest.as_ref().is_none_or(|(least, _)| off(traced) < *least) {
                 nearest = Some((off(traced), Pilot::new(n, render.layers.color)));
             }
-            purchase = sample_count(rays, traced / f64::from(n), "");
+            purchase = count_for_rays(rays, traced / f64::from(n));
         }
         let pilot = nearest.map(|(_, pilot)| pilot);
         let samples = pilot.as_ref().map(|pilot| SampleCount::Samples(pilot.n_samples));
         Ok(Calibration { samples: samples.unwrap_or(purchase), pilot })
     }
 
-    /// Doubles the samples until they take an eighth of the time, then goes along the line through
-    /// the last two.
+    /// Doubles the samples until they take an eighth of the time, then goes along the line through the last two. Where
+    /// the time is short, what takes time once counts as much: the number of samples is tried and corrected.
     fn calibrate_time(&self, seconds: f64) -> Result<Calibration, Error> {
+        /// Up to how many seconds a number of samples is tried.
+        const SHORT: f64 = 2.0;
+        /// How often it is corrected.
+        const CORRECTIONS: usize = 3;
+        /// The share of the time by which it may miss.
+        const MISS: f64 = 0.1;
         self.pilot(1)?; // warms the caches
         let mut render = self.pilot(1)?;
         let mut last = (1, render.seconds());
@@ -187,8 +193,22 @@ impl StrategyRun<'_> {
         let each = if slope > 0.0 { slope } else { last.1 / f64::from(last.0) };
         let fixed = (last.1 - each * f64::from(last.0)).max(0.0);
         let one_sample = format!("takes {:.3} CPU seconds", fixed + each);
-        let samples = sample_count(seconds - fixed, each, &one_sample);
-        Ok(Calibration { samples, pilot: Some(Pilot::new(last.0, render.layers.color)) })
+        let mut samples = sample_count(seconds - fixed, each, &one_sample);
+        let mut pilot = Pilot::new(last.0, render.layers.color);
+        for _ in 0..CORRECTIONS {
+            let SampleCount::Samples(n) = samples else { break };
+            if seconds > SHORT || n <= 2 {
+                break;
+            }
+            let render = self.pilot(n)?;
+            let spent = render.seconds();
+            pilot = Pilot::new(n, render.layers.color);
+            if (spent / seconds - 1.0).abs() < MISS {
+                break;
+            }
+            samples = sample_count(seconds, spent / f64::from(n), "");
+        }
+        Ok(Calibration { samples, pilot: Some(pilot) })
     }
 
     /// Renders all seeds at the number of samples and its halves.
@@ -207,7 +227,7 @@ impl StrategyRun<'_> {
         }
         let mut pictures = PictureSum::default();
         steps.push(self.step(n_samples, image, |render| pictures.add(render, image))?);
-        let bias = pictures.bias(reference.report.rel_mse.unwrap_or(0.0));
+        let bias = pictures.bias(reference.picture.relative_noise().as_deref());
         let PictureSum { first, non_finite, .. } = pictures;
         let image = first.unwrap_or_else(|| RgbImage::new(0, 0, Vec::new()));
         Ok(StrategyMeasurement { steps, image, bias, non_finite })
@@ -249,6 +269,19 @@ fn sample_count(budget: f64, each: f64, one_sample: &str) -> SampleCount {
     SampleCount::Samples(
         (budget / each.max(1e-12)).round().clamp(1.0, f64::from(MOST_SAMPLES)) as u32
     )
+}
+
+/// Whole samples for a budget of rays, if one traces `each`.
+fn count_for_rays(rays: f64, each: f64) -> SampleCount {
+    /// With fewer, the number of samples would be out of proportion to the budget, or without end.
+    const LEAST: f64 = 1.0 / 64.0;
+    if each.is_nan() || each < LEAST {
+        return SampleCount::OverBudget(format!(
+            "one camera sample per pixel traces {each:.2} shadow rays, too few for a budget of rays; give one of samples \
+             (spp:N) or time (time:T)"
+        ));
+    }
+    sample_count(rays, each, &format!("traces {each:.1} shadow rays"))
 }
 
 /// The pictures of all seeds, added up.
@@ -298,29 +331,51 @@ impl PictureSum {
         self.n += 1;
     }
 
-    /// Two independent pictures I and J have E[(I − R)(J − R)] = bias² + that of the reference's own error, so the mean
-    /// over all pairs, ((Σ d)² − Σ d²) / (n (n − 1)), less `noise` estimates bias².
+    /// Two independent pictures I and J and the halves A and B of the reference have E[(I − A)(J − B)] = bias². Over both
+    /// ways to pair them, (I − A)(J − B) is (I − R)(J − R) − ((A − B)/2)², so the mean over all pairs of pictures,
+    /// ((Σ d)² − Σ d²) / (n (n − 1)), less `noise` of the reference, ((A − B)/2)² relative as d² is, estimates bias².
     ///
     /// The spread of pixels gives the interval if they err independently of one another, the reference's included. Where
     /// the pixels of a picture share an error, as those of `product` do, three pictures or more give a wider one.
-    fn bias(&self, noise: f64) -> Option<Bias> {
+    fn bias(&self, noise: Option<&[[f32; 3]]>) -> Option<Bias> {
         if self.n < 2 {
             return None;
         }
         let n = f64::from(self.n);
         let of_channel = |[sum, squares]: [f64; 2]| (sum * sum - squares) / (n * (n - 1.0));
-        let of_pixel =
-            |sums: &[[f64; 2]; 3]| sums.iter().copied().map(of_channel).sum::<f64>() / 3.0;
+        let of_pixel = |(i, sums): (usize, &[[f64; 2]; 3])| {
+            let noise: f64 = noise.map_or(0.0, |noise| noise[i].map(f64::from).iter().sum());
+            (sums.iter().copied().map(of_channel).sum::<f64>() - noise) / 3.0
+        };
         let n_pixels = self.sums.len() as f64;
-        let mean = self.sums.iter().map(of_pixel).sum::<f64>() / n_pixels;
-        let variance = self.sums.iter().map(|s| (of_pixel(s) - mean).powi(2)).sum::<f64>()
+        let pixels = || self.sums.iter().enumerate();
+        let mean = pixels().map(of_pixel).sum::<f64>() / n_pixels;
+        let variance = pixels().map(|pixel| (of_pixel(pixel) - mean).powi(2)).sum::<f64>()
             / (n_pixels * (n_pixels - 1.0).max(1.0));
-        let freedom = self.differences.len() as f64 - 1.0;
-        let of_pictures = |variance: f64| student(freedom) * variance.sqrt();
         let half = 1.96 * variance.sqrt();
-        let half = self.variance_by_jackknife().map_or(half, |v| half.max(of_pictures(v)));
-        let mean = mean - noise;
+        let half = half.max(self.half_width_by_pictures(mean).unwrap_or(0.0));
         Some(Bias { mean, interval: [mean - half, mean + half] })
+    }
+
+    /// Half of the interval of the mean over pairs of pictures that the spread of pictures gives; none of fewer than three.
+    ///
+    /// Products of two pictures' errors are uncorrelated without bias, though pairs have pictures in common, so each counts.
+    /// A `mean` beyond that interval is a bias. It multiplies the errors of all pairs of a picture, which only leaving out
+    /// pictures shows.
+    fn half_width_by_pictures(&self, mean: f64) -> Option<f64> {
+        let n_pictures = self.differences.len();
+        if n_pictures < 3 {
+            return None;
+        }
+        let n = self.products.len() as f64;
+        let average = self.products.iter().sum::<f64>() / n;
+        let squares: f64 = self.products.iter().map(|product| (product - average).powi(2)).sum();
+        let of_pairs = student(n - 1.0) * (squares / (n * (n - 1.0))).sqrt();
+        if mean <= of_pairs {
+            return Some(of_pairs);
+        }
+        let variance = self.variance_by_jackknife()?;
+        Some(of_pairs.max(student(n_pictures as f64 - 1.0) * variance.sqrt()))
     }
 
     /// The variance of the mean over pairs of pictures, by leaving out one picture at a time; none of fewer than three.
@@ -381,10 +436,62 @@ mod tests {
     }
 
     #[test]
+    fn strategies_without_rays_have_no_budget_of_rays() {
+        assert!(matches!(count_for_rays(64.0, 0.5), SampleCount::Samples(128)));
+        assert!(matches!(count_for_rays(1.0, 0.05), SampleCount::Samples(20)));
+        for each in [0.0, 0.01] {
+            let SampleCount::OverBudget(why) = count_for_rays(1.0, each) else { panic!("{each}") };
+            assert!(why.contains("too few for a budget of rays"), "{why}");
+        }
+        assert!(matches!(count_for_rays(1.0, 4.0), SampleCount::OverBudget(_)));
+    }
+
+    #[test]
     fn the_deviation_is_that_of_a_sample() {
         let deviation = MeanAndDeviation::of(&[1.0, 2.0, 3.0]);
         assert_eq!((deviation.mean, deviation.sd), (2.0, Some(1.0)));
         assert!(MeanAndDeviation::of(&[4.0]).sd.is_none());
+    }
+
+    /// What relMSE counts of the error of the mean of two halves.
+    fn relative_noise(halves: &[RgbImage; 2]) -> Vec<[f32; 3]> {
+        let [a, b] = halves.each_ref().map(|half| half.pixels.iter());
+        let of_pixel = |(a, b): (&Rgb, &Rgb)| {
+            let (mean, half) = ((*a + *b) * 0.5, (*a - *b) * 0.5);
+            let (mean, half) = (mean.to_array(), half.to_array());
+            std::array::from_fn(|c| half[c] * half[c] / (mean[c] * mean[c] + REGULARIZER as f32))
+        };
+        a.zip(b).map(of_pixel).collect()
+    }
+
+    /// A reference as noisy as the pictures, with pixels as dark as the noise and as bright as lamps.
+    #[test]
+    fn noisy_references_are_no_bias() {
+        let side = 32;
+        let mut pcg = Pcg32::new(11, 12);
+        let mut picture = |noise: f32| {
+            RgbImage::from_fn(side, side, |x, _| {
+                let value = [0.02, 0.2, 1.0, 20.0][x % 4];
+                // Seldom bright, as pictures are.
+                let is_bright = pcg.next_f32() < 0.2;
+                Rgb::splat(value * (1.0 + noise * if is_bright { 2.0 } else { -0.5 }))
+            })
+        };
+        let mut n_inside = 0;
+        for _ in 0..40 {
+            let halves = [(); 2].map(|()| picture(0.14));
+            let reference = RgbImage::from_fn(side, side, |x, y| {
+                (halves[0].get(x, y) + halves[1].get(x, y)) * 0.5
+            });
+            let mut pictures = PictureSum::default();
+            for _ in 0..3 {
+                pictures.add_picture(&picture(0.1), &reference);
+            }
+            let noise = relative_noise(&halves);
+            let Bias { interval: [low, high], .. } = pictures.bias(Some(&noise)).unwrap();
+            n_inside += u32::from(low <= 0.0 && 0.0 <= high);
+        }
+        assert!((36..=40).contains(&n_inside), "{n_inside} of 40 intervals hold 0");
     }
 
     /// Noisy pictures without bias against a noisy reference, and pictures with bias.
@@ -395,23 +502,28 @@ mod tests {
         // Little, as errors are divided by the reference with its noise.
         let noise = 0.01f64;
         // A uniform number of variance noise².
-        let mut noisy = |value: f32| {
-            let pixel =
-                |_, _| Rgb::splat(value + noise as f32 * 12f32.sqrt() * (pcg.next_f32() - 0.5));
-            RgbImage::from_fn(width, height, pixel)
+        let mut noisy = |value: f32, factor: f64| {
+            let range = (factor * noise) as f32 * 12f32.sqrt();
+            RgbImage::from_fn(width, height, |_, _| {
+                Rgb::splat(value + range * (pcg.next_f32() - 0.5))
+            })
         };
         let of_reference = noise * noise / 1.01;
         for bias in [0.0f64, 0.005] {
             let truth = bias * bias / 1.01;
             let mut n_inside = 0;
             for _ in 0..60 {
-                let reference = noisy(1.0);
+                let halves = [(); 2].map(|()| noisy(1.0, 2f64.sqrt()));
+                let reference = RgbImage::from_fn(width, height, |x, y| {
+                    (halves[0].get(x, y) + halves[1].get(x, y)) * 0.5
+                });
+                let noise = relative_noise(&halves);
                 let mut pictures = PictureSum::default();
-                assert_eq!(pictures.bias(of_reference), None);
+                assert_eq!(pictures.bias(Some(&noise)), None);
                 for _ in 0..n_seeds {
-                    pictures.add_picture(&noisy(1.0 + bias as f32), &reference);
+                    pictures.add_picture(&noisy(1.0 + bias as f32, 1.0), &reference);
                 }
-                let Bias { mean, interval: [low, high] } = pictures.bias(of_reference).unwrap();
+                let Bias { mean, interval: [low, high] } = pictures.bias(Some(&noise)).unwrap();
                 assert!(low < mean && mean < high, "{low} to {high}");
                 assert!(high - low < 0.3 * of_reference, "{low} to {high}");
                 n_inside += u32::from(low <= truth && truth <= high);
@@ -440,7 +552,7 @@ mod tests {
                     });
                     pictures.add_picture(&picture, &reference);
                 }
-                let Bias { interval: [low, high], .. } = pictures.bias(0.0).unwrap();
+                let Bias { interval: [low, high], .. } = pictures.bias(None).unwrap();
                 n_inside += u32::from(low <= truth && truth <= high);
             }
             assert!(n_inside >= 85, "{bias}: {n_inside} of 100 intervals hold the truth");

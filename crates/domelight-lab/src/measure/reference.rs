@@ -39,6 +39,9 @@ const SAMPLES: &str = "domelight.reference.samples";
 /// The layer for the picture without shadows.
 const UNOCCLUDED: &str = "unoccluded";
 
+/// The layer for half of the difference of the two halves.
+const HALF_DIFFERENCE: &str = "half-difference";
+
 /// The converged picture.
 #[derive(Clone, Debug)]
 pub struct Reference {
@@ -57,6 +60,8 @@ pub struct ReferencePicture {
     pub alpha: Option<Vec<f32>>,
     /// The picture with every shadow ray unoccluded; `None` for files and other programs.
     pub unoccluded: Option<RgbImage>,
+    /// Half of the difference of its two halves, whose square is the variance of a pixel in expectation; `None` for files.
+    pub half_difference: Option<RgbImage>,
 }
 
 /// The source of the reference.
@@ -118,7 +123,7 @@ const PILOT: u32 = 16;
 impl From<Layers> for ReferencePicture {
     fn from(layers: Layers) -> Self {
         let Layers { color: image, alpha, unoccluded, .. } = layers;
-        Self { image, alpha: Some(alpha), unoccluded: Some(unoccluded) }
+        Self { image, alpha: Some(alpha), unoccluded: Some(unoccluded), half_difference: None }
     }
 }
 
@@ -133,6 +138,17 @@ impl ReferencePicture {
         Some(self.alpha.as_ref()?.iter().map(|&alpha| alpha > 0.0).collect())
     }
 
+    /// What relMSE counts of the error of the reference itself, an estimate for each pixel and channel.
+    pub(crate) fn relative_noise(&self) -> Option<Vec<[f32; 3]>> {
+        let half_difference = self.half_difference.as_ref()?;
+        let pixels = self.image.pixels.iter().zip(&half_difference.pixels);
+        let noise = pixels.map(|(r, d)| {
+            let (r, d) = (r.to_array(), d.to_array());
+            std::array::from_fn(|c| d[c] * d[c] / (r[c] * r[c] + REGULARIZER as f32))
+        });
+        Some(noise.collect())
+    }
+
     /// The mean m of two halves.
     fn mean(&self, other: &Self) -> Self {
         let alpha = self.alpha.iter().flatten().zip(other.alpha.iter().flatten());
@@ -141,6 +157,7 @@ impl ReferencePicture {
             image: mean(&self.image, &other.image),
             alpha: self.alpha.as_ref().map(|_| alpha.map(|(a, b)| 0.5 * (a + b)).collect()),
             unoccluded: unoccluded.map(|(a, b)| mean(a, b)),
+            half_difference: Some(half_difference(&self.image, &other.image)),
         }
     }
 
@@ -148,6 +165,9 @@ impl ReferencePicture {
         let mut layers = ExrLayers::from_image(&self.image, self.alpha.as_deref());
         if let Some(unoccluded) = &self.unoccluded {
             layers.push_rgb(UNOCCLUDED, unoccluded, None);
+        }
+        if let Some(half_difference) = &self.half_difference {
+            layers.push_rgb(HALF_DIFFERENCE, half_difference, None);
         }
         let attribute = |name: &str, value: String| (name.to_owned(), value);
         layers.attributes =
@@ -160,21 +180,32 @@ impl ReferencePicture {
     /// The picture, its noise and its samples.
     fn decode(bytes: &[u8], file: &str, host: &dyn Host) -> Option<(Self, Noise, u32)> {
         let main = read_bytes(bytes, file, &ReadOptions::default()).ok()?;
-        let layer =
-            ReadOptions { layer: Some(UNOCCLUDED.to_owned()), max_memory: host.memory_left() };
-        let unoccluded = read_bytes(bytes, file, &layer).ok().map(|read| read.image);
+        let layer = |name: &str| {
+            let options =
+                ReadOptions { layer: Some(name.to_owned()), max_memory: host.memory_left() };
+            read_bytes(bytes, file, &options).ok().map(|read| read.image)
+        };
+        let unoccluded = layer(UNOCCLUDED);
+        // References of earlier versions are rendered again.
+        let half_difference = Some(layer(HALF_DIFFERENCE)?);
         let attributes = text_attributes(bytes).ok()?;
         let attribute = |key| attributes.iter().find(|(name, _)| name == key).map(|(_, text)| text);
         let (all, spp) = (attribute(NOISE)?.parse().ok()?, attribute(SAMPLES)?.parse().ok()?);
         let covered = attribute(COVERED_NOISE).and_then(|noise| noise.parse().ok());
         let noise = Noise { all, covered };
-        Some((Self { image: main.image, alpha: main.alpha, unoccluded }, noise, spp))
+        let picture = Self { image: main.image, alpha: main.alpha, unoccluded, half_difference };
+        Some((picture, noise, spp))
     }
 }
 
 fn mean(a: &RgbImage, b: &RgbImage) -> RgbImage {
     let mean = a.pixels.iter().zip(&b.pixels).map(|(&a, &b)| (a + b) * 0.5);
     RgbImage::new(a.width, a.height, mean.collect::<Vec<Rgb>>())
+}
+
+fn half_difference(a: &RgbImage, b: &RgbImage) -> RgbImage {
+    let half = a.pixels.iter().zip(&b.pixels).map(|(&a, &b)| (a - b) * 0.5);
+    RgbImage::new(a.width, a.height, half.collect::<Vec<Rgb>>())
 }
 
 impl Reference {
@@ -206,7 +237,9 @@ impl Reference {
             rel_mse: None,
             rel_mse_covered: None,
         };
-        Ok(Self { picture: ReferencePicture { image, alpha: None, unoccluded: None }, report })
+        let (alpha, unoccluded, half_difference) = (None, None, None);
+        let picture = ReferencePicture { image, alpha, unoccluded, half_difference };
+        Ok(Self { picture, report })
     }
 
     /// From the cache, else taken half by half by `render`, which is given camera samples per pixel and 0 or 1,
