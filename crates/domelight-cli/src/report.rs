@@ -1,7 +1,7 @@
 //! The report of a render, as JSON or as two lines of text.
 
 use anyhow::Result;
-use domelight::render::{Counts, Provenance, RenderSettings, Rendering};
+use domelight::render::{Counts, Layers, Provenance, RenderSettings, Rendering};
 use domelight_lab::report::SceneReport;
 use domelight_lab::{Acceptance, Host as _, Seconds, peak_memory};
 use serde::Serialize;
@@ -77,6 +77,8 @@ pub(crate) struct RenderReport {
     version: &'static str,
     settings: Settings,
     seconds: Timings,
+    /// Camera samples of a pixel, as counted; the mean over those that have any.
+    samples_per_pixel: f64,
     camera_rays: u64,
     shading_points: u64,
     shadow_rays: u64,
@@ -104,6 +106,13 @@ fn listed(names: &[String]) -> String {
     }
 }
 
+/// The mean number of camera samples of pixels that have any.
+fn mean_samples(layers: &Layers) -> f64 {
+    let counts = || layers.n_samples.iter().filter(|&&n| n > 0);
+    let sum: u64 = counts().map(|&n| u64::from(n)).sum();
+    sum as f64 / counts().count().max(1) as f64
+}
+
 impl RenderReport {
     /// The report of a run that continues the work of `earlier` ones, whose rays do not count as its speed.
     pub(crate) fn new(
@@ -123,6 +132,7 @@ impl RenderReport {
             settings,
             rays_per_second: rays / seconds.render.wall.max(1e-9),
             seconds,
+            samples_per_pixel: mean_samples(&rendering.layers),
             camera_rays: counts.camera_rays,
             shading_points: counts.shading_points,
             shadow_rays: counts.shadow_rays,
@@ -150,8 +160,13 @@ impl RenderReport {
         let Timings { load, build, render, write, total } = &self.seconds;
         let up_to = if target_error.is_some() { "up to " } else { "" };
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
+        let taken = if self.settings.adaptive || target_error.is_some() {
+            format!(" ({:.1} taken)", self.samples_per_pixel)
+        } else {
+            String::new()
+        };
         status(&format!(
-            "{scene} under {environment}: {w}x{h}, {up_to}{spp} samples per pixel, {strategy}"
+            "{scene} under {environment}: {w}x{h}, {up_to}{spp} samples per pixel{taken}, {strategy}"
         ));
         let png = self.png.map_or(String::new(), |shown| format!(" (PNG at {shown})"));
         status(&format!(
