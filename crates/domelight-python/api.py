@@ -18,7 +18,7 @@ SECTIONS = {
     "Rendering": ["render", "progressive", "Film", "Progressive"],
     "Scenes": ["Scene", "Camera", "Material", "Bsdf"],
     "Light": ["Environment", "Density", "lights", "Rig"],
-    "Strategies": ["strategy_names", "ShadingPoints", "strategies"],
+    "Strategies": ["strategy_names", "strategy", "ShadingPoints", "strategies"],
     "Comparing and inspecting": ["compare", "Comparison", "inspect", "Inspection"],
     "Pictures": ["read", "write", "tone_map", "metrics"],
     "Proofs": ["testing"],

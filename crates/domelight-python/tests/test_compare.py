@@ -66,3 +66,9 @@ def test_progress_is_reported(sphere, env, capfd):
 def test_wrong_wishes_are_named(sphere, env, wrong, words):
     with pytest.raises(ValueError, match=words):
         dl.compare(sphere, env, **{"strategies": ["mis"], **SMALL, **wrong})
+
+
+def test_a_comparison_is_one_line(sphere, env):
+    few = dict(budget="spp:1", seeds=1, reference_spp=4, size=(8, 8))
+    found = dl.compare(sphere, env, ["mis", "brdf"], **few)
+    assert repr(found) == "<Comparison 8 x 8: mis, brdf>"

@@ -162,3 +162,23 @@ def test_the_line_of_a_scene_file_that_names_a_missing_map_is_named(tmp_path):
     scene = dl.Scene.load(path)
     with pytest.raises(FileNotFoundError, match=r"scene\.toml.*line 1, \[environment\].*none\.hdr"):
         scene.environment()
+
+
+def test_messages_name_the_argument(env):
+    def refused(match, function, *args, **kwargs):
+        with pytest.raises(ValueError, match=match):
+            function(*args, **kwargs)
+
+    for render in (dl.render, dl.progressive):
+        refused(r"size is 8; it must be \(width, height\)", render, SPHERE, env, size=8)
+        refused(r"size is \(8, 8, 3\)", render, SPHERE, env, size=(8, 8, 3))
+        refused(r"size is \(8.5, 8\)", render, SPHERE, env, size=(8.5, 8))
+        refused(r"spp is -1; it must be a whole number from 1 to 16777216", render, SPHERE, env, spp=-1)
+        refused(r"spp is 2.5", render, SPHERE, env, spp=2.5)
+        refused(r"seed is -3", render, SPHERE, env, seed=-3)
+    refused(r"strategies is 'mis'; it must be a list, such as \['mis'\]", dl.compare, SPHERE, env, "mis")
+    refused(r"seeds is 0", dl.compare, SPHERE, env, ["mis"], seeds=0)
+    refused(r"reference_spp is -2", dl.compare, SPHERE, env, ["mis"], reference_spp=-2)
+    refused(r"pixel is 3; it must be \(column, row\)", dl.inspect, SPHERE, env, pixel=3)
+    refused(r"strategies is 'mis'", dl.inspect, SPHERE, env, pixel=(1, 1), strategies="mis")
+    refused(r"n_rays is 0; it must be a whole number", dl.strategy, n_rays=0)

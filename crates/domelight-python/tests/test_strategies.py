@@ -183,3 +183,13 @@ def test_a_strategy_in_python_is_fast_enough(sphere, env):
     python = rate(dl.strategies.Environment(env), tile_size=64)
     print(f"\nshadow rays per second: built in {built_in:.3g}, Python {python:.3g}, {python / built_in:.0%}")
     assert python > 0.25 * built_in
+
+
+def test_the_decorator_sets_the_number_of_rays(sphere, env):
+    @dl.strategy(n_rays=2)
+    def two(points):
+        return dl.strategies.Environment(env, 2)(points)
+
+    assert two.n_rays == 2
+    film = dl.render(sphere, env, two, spp=1, size=(8, 8))
+    assert film == dl.render(sphere, env, "environment:2", spp=1, size=(8, 8))

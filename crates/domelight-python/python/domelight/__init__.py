@@ -45,6 +45,7 @@ from ._domelight import (
 from ._compare import Comparison, compare
 from ._inspect import Inspection, inspect
 from ._render import progressive, render
+from .strategies import strategy
 
 __all__ = [
     "Bsdf",
@@ -70,6 +71,7 @@ __all__ = [
     "read",
     "render",
     "strategies",
+    "strategy",
     "strategy_names",
     "testing",
     "tone_map",

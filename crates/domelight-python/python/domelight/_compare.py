@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _domelight
+from . import _arguments, _domelight
 from ._inspect import named
 from ._progress import bar, callback
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .strategies import Strategy
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """The result of a comparison; a notebook displays its page.
 
@@ -51,6 +51,11 @@ class Comparison:
         """Write the page."""
         with open(path, "w", encoding="utf-8") as file:
             file.write(self.page)
+
+    def __repr__(self) -> str:
+        height, width = self.reference.shape[:2]
+        names = ", ".join(strategy["name"] for strategy in self.report["strategies"])
+        return f"<Comparison {width} x {height}: {names}>"
 
     def __str__(self) -> str:
         lines = [f"{'strategy':24} {'spp':>6} {'rays':>8} {'CPU s':>8} {'relMSE':>10}"]
@@ -136,10 +141,10 @@ def compare(
             env,
             named(strategies),
             budget,
-            seeds,
-            reference_spp,
-            size,
-            seed,
+            _arguments.whole("seeds", seeds, 1, 1000),
+            _arguments.spp(reference_spp, "reference_spp"),
+            _arguments.size(size),
+            _arguments.seed(seed),
             threads,
             camera,
             hide_env,

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _domelight
+from . import _arguments, _domelight
 
 if TYPE_CHECKING:
     from ._domelight import Camera, Environment, Scene
@@ -61,7 +61,7 @@ class Decomposition:
     density: npt.NDArray[np.float32] | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Inspection:
     """The X-ray of a pixel; a notebook shows it as a figure if matplotlib is installed.
 
@@ -96,6 +96,10 @@ class Inspection:
     maps: dict[str, npt.NDArray[np.float32]]
     strategies: list[Decomposition]
     advice: str
+
+    def __repr__(self) -> str:
+        names = ", ".join(s.name for s in self.strategies)
+        return f"<Inspection of pixel {self.pixel[0]}, {self.pixel[1]}: {names}>"
 
     def __str__(self) -> str:
         lines = [f"pixel {self.pixel[0]}, {self.pixel[1]}"]
@@ -160,6 +164,8 @@ def named(
     """Strategies with their names: their texts, or the names of functions."""
     if isinstance(strategies, Mapping):
         return list(strategies.items())
+    if isinstance(strategies, str) or not isinstance(strategies, Iterable):
+        raise ValueError(f"strategies is {strategies!r}; it must be a list, such as [{strategies!r}], or a dictionary")
     return [
         (s if isinstance(s, str) else getattr(s, "__name__", type(s).__name__), s)
         for s in strategies
@@ -206,7 +212,16 @@ def inspect(
         If the pixel is not in the picture, or a setting is invalid.
     """
     found = _domelight.inspect(
-        scene, env, named(strategies), pixel, size, seed, threads, camera, hide_env, resolution
+        scene,
+        env,
+        named(strategies),
+        _arguments.pair("pixel", pixel, "column, row"),
+        _arguments.size(size),
+        _arguments.seed(seed),
+        threads,
+        camera,
+        hide_env,
+        resolution,
     )
     found["strategies"] = [Decomposition(**s) for s in found["strategies"]]
     return Inspection(**found)

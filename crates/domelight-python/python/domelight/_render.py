@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from . import _domelight
+from . import _arguments, _domelight
 from ._progress import bar, callback
 
 if TYPE_CHECKING:
@@ -39,9 +39,9 @@ def render(
             scene,
             env,
             strategy,
-            spp=spp,
-            size=size,
-            seed=seed,
+            spp=_arguments.spp(spp),
+            size=_arguments.size(size),
+            seed=_arguments.seed(seed),
             threads=threads,
             camera=camera,
             filter=filter,
@@ -82,9 +82,9 @@ def progressive(
         scene,
         env,
         strategy,
-        spp=spp,
-        size=size,
-        seed=seed,
+        spp=_arguments.spp(spp),
+        size=_arguments.size(size),
+        seed=_arguments.seed(seed),
         threads=threads,
         camera=camera,
         filter=filter,

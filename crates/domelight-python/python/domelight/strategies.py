@@ -14,7 +14,7 @@ rays per point.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,36 @@ Rays: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]
 
 Strategy: TypeAlias = "Callable[[ShadingPoints], Rays]"
 """A function that generates shadow rays for the points of a tile."""
+
+
+_Function = TypeVar("_Function", bound="Strategy")
+
+
+def strategy(*, n_rays: int) -> Callable[[_Function], _Function]:
+    """Declare the maximum number of rays per point of a function, as its attribute `n_rays`.
+
+    Parameters
+    ----------
+    n_rays : int
+        At least 1.
+
+    Examples
+    --------
+    >>> import domelight as dl
+    >>> @dl.strategy(n_rays=2)
+    ... def two_rays(points):
+    ...     return dl.strategies.Brdf(env, n=2)(points)
+    """
+    if isinstance(n_rays, bool) or not isinstance(n_rays, int) or n_rays < 1:
+        raise ValueError(f"n_rays is {n_rays!r}; it must be a whole number of at least 1")
+
+    def declare(function: _Function) -> _Function:
+        if not callable(function):
+            raise ValueError(f"strategy(n_rays={n_rays}) is given {function!r}, not a function")
+        function.n_rays = n_rays  # type: ignore[attr-defined]
+        return function
+
+    return declare
 
 
 class _Sampler(Protocol):
