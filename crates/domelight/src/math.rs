@@ -37,18 +37,24 @@ pub(crate) fn atan2<F: SimdFloat>(y: F, x: F) -> F {
 }
 
 /// Sine and cosine of `u` turns for u in [0, 1], to 2·10⁻⁷.
+#[inline(always)]
+pub(crate) fn sin_cos_turns<F: SimdFloat>(u: F) -> [F; 2] {
+    // Half a turn less, which changes both signs.
+    let [sin, cos] = sin_cos_half_turns(u - u.splat(0.5));
+    [u.splat(0.0) - sin, u.splat(0.0) - cos]
+}
+
+/// Sine and cosine of `x` turns for x in [−½, ½], to 2·10⁻⁷.
 ///
 /// sin 2πt = t P(t²) on [0, ¼], P a minimax polynomial; the other quadrants by reflection.
 #[inline(always)]
-pub(crate) fn sin_cos_turns<F: SimdFloat>(u: F) -> [F; 2] {
-    let (zero, quarter) = (u.splat(0.0), u.splat(0.25));
-    // Half a turn less, which changes both signs.
-    let x = u - u.splat(0.5);
+pub(crate) fn sin_cos_half_turns<F: SimdFloat>(x: F) -> [F; 2] {
+    let (zero, quarter) = (x.splat(0.0), x.splat(0.25));
     let t = x.abs();
-    let folded = t.min(u.splat(0.5) - t);
+    let folded = t.min(x.splat(0.5) - t);
     let (sin, cos) = (sine_of_quarter(folded), sine_of_quarter(quarter - folded));
-    let sin = F::select(x.lt(zero), sin, zero - sin);
-    [sin, F::select(t.lt(quarter), zero - cos, cos)]
+    let sin = F::select(x.lt(zero), zero - sin, sin);
+    [sin, F::select(t.lt(quarter), cos, zero - cos)]
 }
 
 /// Sine and cosine of `t` eighths of a turn for t in [−1, 1], to 2·10⁻⁷.

@@ -18,6 +18,7 @@ mod instances;
 mod mapping;
 mod materials;
 mod picture_io;
+mod point_lanes;
 mod product_sampling;
 mod product_strategy;
 mod quoting;

@@ -296,28 +296,76 @@ impl From<Lobe> for Bsdf {
     }
 }
 
-impl Brdf for Bsdf {
+/// The probability of choosing each lobe, for several views side by side.
+#[derive(Clone, Copy)]
+pub(crate) struct LobeChoice<F>([F; MAX_LOBES]);
+
+impl Bsdf {
+    /// The choice among the lobes.
     #[inline(always)]
-    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+    pub(crate) fn choice<F: SimdFloat>(&self, like: F) -> LobeChoice<F> {
+        let [a, b, c] = self.probabilities();
+        LobeChoice([like.splat(a), like.splat(b), like.splat(c)])
+    }
+
+    /// The choices of BSDFs that differ in nothing else, one per lane.
+    #[inline(always)]
+    pub(crate) fn choices<'b, F: SimdFloat>(
+        like: F,
+        bsdf: impl Fn(usize) -> &'b Self,
+    ) -> LobeChoice<F> {
+        LobeChoice(like.by_lane(|lane| bsdf(lane).probabilities()))
+    }
+
+    #[inline(always)]
+    fn probabilities(&self) -> [f32; MAX_LOBES] {
+        let [a, b, c] = &self.terms;
+        [a.probability, b.probability, c.probability]
+    }
+
+    /// Whether both are the same but for [`Bsdf::for_view`], and all their lobes are the library's.
+    #[inline]
+    pub(crate) fn is_same_material(&self, other: &Self) -> bool {
+        let same = |(a, b): (&Term, &Term)| {
+            a.weight == b.weight && a.lobe == b.lobe && !matches!(a.lobe, Lobe::Custom(_))
+        };
+        self.n_terms == other.n_terms && self.terms().iter().zip(other.terms()).all(same)
+    }
+
+    /// [`Brdf::eval_lanes`] for lobes that are chosen with other probabilities.
+    #[inline(always)]
+    pub(crate) fn eval_chosen<F: SimdFloat>(
+        &self,
+        choice: &LobeChoice<F>,
+        wo: Vectors<F>,
+        wi: Vectors<F>,
+    ) -> (Colors<F>, F) {
         let one = |x| wi.z.splat(x);
         let (mut value, mut pdf) = (Colors::splat(wi.z, Rgb::BLACK), one(0.0));
-        for term in self.terms() {
+        for (term, &probability) in self.terms().iter().zip(&choice.0) {
             let (v, p) = term.lobe.eval_lanes(wo, wi);
             value = value.zip(v.scaled(one(term.weight)), |a, b| a + b);
-            pdf = pdf + p * one(term.probability);
+            pdf = pdf + p * probability;
         }
         (value, pdf)
     }
 
+    /// [`Brdf::sample_lanes`] for lobes that are chosen with other probabilities.
+    ///
     /// The remainder of `u_lobe` after the choice of a lobe is uniform again, and chooses within the lobe.
     #[inline(always)]
-    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
+    pub(crate) fn sample_chosen<F: SimdFloat>(
+        &self,
+        choice: &LobeChoice<F>,
+        wo: Vectors<F>,
+        u_lobe: F,
+        u: [F; 2],
+    ) -> Vectors<F> {
         let one = |x| wo.z.splat(x);
         let mut wi = Vectors::splat(wo.z, Vec3::ZERO);
         // Lanes whose lobe is this one or a later one, and what is left of their numbers.
         let (mut open, mut rest) = (u_lobe.le(u_lobe), u_lobe);
-        for (i, term) in self.terms().iter().enumerate() {
-            let probability = one(term.probability);
+        for (i, (term, &probability)) in self.terms().iter().zip(&choice.0).enumerate() {
             let is_last = i + 1 == self.terms().len();
             let chosen = if is_last { open } else { open & rest.lt(probability) };
             if chosen.bits() != 0 {
@@ -328,6 +376,18 @@ impl Brdf for Bsdf {
             rest = rest - probability;
         }
         wi
+    }
+}
+
+impl Brdf for Bsdf {
+    #[inline(always)]
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+        self.eval_chosen(&self.choice(wi.z), wo, wi)
+    }
+
+    #[inline(always)]
+    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
+        self.sample_chosen(&self.choice(wo.z), wo, u_lobe, u)
     }
 
     /// The sum of the lobes' bounds.

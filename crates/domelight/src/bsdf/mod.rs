@@ -50,6 +50,7 @@ pub use fresnel::{Conductor, Fresnel};
 pub use ggx::{Ggx, GgxNormals};
 pub use lambert::Lambert;
 pub use lobe_summary::{GlossyLobe, LobeSummary};
+pub(crate) use lobes::LobeChoice;
 pub use lobes::{Bsdf, Lobe, MAX_LOBES, TooManyLobes};
 pub use metallic_roughness::MetallicRoughness;
 pub use microfacet::{Masking, Microfacet, NormalDistribution, Scattering};

@@ -1,10 +1,11 @@
 //! MIS compensation: Karlík et al. 2019, "MIS Compensation: Optimizing Sampling Techniques in
 //! Multiple Importance Sampling".
 
-use super::{Environment, EnvironmentSample};
+use super::{Environment, EnvironmentSample, LightDensity};
 use crate::Rgb;
 use crate::math::{Vec2, Vec3};
 use crate::sampling::HierarchicalTable;
+use crate::simd::Colors;
 
 /// A table of max(L − mean L, 0), which leaves the dim parts of the map to another technique.
 ///
@@ -34,7 +35,7 @@ impl CompensatedTable {
 
     /// Samples a direction; `None` if nothing exceeds the mean.
     pub fn sample(&self, environment: &Environment, u: Vec2) -> Option<EnvironmentSample> {
-        environment.sample_table(self.table.as_ref()?, u, |le| self.density(le))
+        self.light_density().sample(environment, u)
     }
 
     /// The radiance from `wi`, and the density of [`CompensatedTable::sample`] \[sr⁻¹\].
@@ -50,6 +51,13 @@ impl CompensatedTable {
 
     /// The density \[sr⁻¹\] at a texel of this radiance.
     pub(crate) fn density(&self, le: Rgb) -> f32 {
-        (le.luminance() - self.floor).max(0.0) * self.inverse_total
+        self.light_density().pdf(Colors::from(le))
+    }
+
+    /// The density that the table samples.
+    #[inline]
+    pub(crate) fn light_density(&self) -> LightDensity<'_> {
+        let Self { ref table, floor, inverse_total } = *self;
+        LightDensity { table: table.as_ref(), floor, inverse_total }
     }
 }

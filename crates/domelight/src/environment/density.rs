@@ -86,8 +86,9 @@ impl EnvironmentDensity {
     pub fn sample(&self, environment: &Environment, u: Vec2) -> Option<EnvironmentSample> {
         let drawn = self.table.sample(u);
         let texel = Texel { column: drawn.column, row: drawn.row };
-        let inside = environment.grid.direction_inside(texel, drawn.inside);
-        let wi = environment.orientation.up.to_world(inside);
+        let (column, row) = (texel.column as f32, texel.row as f32);
+        let inside = environment.grid.directions_inside(column, row, drawn.inside.to_array());
+        let wi = environment.orientation.up.to_world(inside.into());
         let le = environment.map.get(texel.column, texel.row);
         let pdf = self.density(texel);
         (pdf > 0.0).then_some(EnvironmentSample { wi, le, pdf })

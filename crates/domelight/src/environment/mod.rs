@@ -16,6 +16,7 @@ mod guess;
 pub mod io;
 mod key_light;
 pub(crate) mod lat_long;
+mod light_density;
 pub mod mapping;
 #[cfg(feature = "io")]
 mod repair;
@@ -25,12 +26,15 @@ pub use compensation::CompensatedTable;
 pub use density::{DensityError, EnvironmentDensity};
 pub use key_light::key_light_rotation;
 pub use lat_long::LatLongGrid;
+pub(crate) use light_density::LightDensity;
 
 use std::borrow::Cow;
 
-use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, vec2, vec3};
+use crate::math::{
+    Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, sin_cos_half_turns, vec2,
+};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
-use crate::simd::{LANES, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
+use crate::simd::{Colors, LANES, LaneMask as _, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
 use crate::{Rgb, RgbImage};
 
 /// A world axis that points up; the top row of a map faces it.
@@ -70,9 +74,15 @@ impl UpAxis {
 
     /// Transforms from the map's own frame to world space.
     pub(crate) fn to_world(self, m: Vec3) -> Vec3 {
+        self.to_world_lanes(m.into()).into()
+    }
+
+    /// [`UpAxis::to_world`] of one direction or of several side by side.
+    #[inline(always)]
+    fn to_world_lanes<F: SimdFloat>(self, m: Vectors<F>) -> Vectors<F> {
         match self {
             Self::Y => m,
-            Self::Z => vec3(m.x, -m.z, m.y),
+            Self::Z => Vectors { x: m.x, y: m.z.splat(0.0) - m.z, z: m.y },
         }
     }
 }
@@ -481,8 +491,17 @@ impl Environment {
 
     /// Radiance from the unit direction `wi`, constant over each texel, in multiples of [`Environment::unit`].
     pub fn le(&self, wi: Vec3) -> Rgb {
-        let t = self.texel(wi);
-        self.map.get(t.column, t.row)
+        self.le_lanes(Vectors::from(wi)).single()
+    }
+
+    /// [`Environment::le`] of one direction or of several side by side.
+    #[inline(always)]
+    pub(crate) fn le_lanes<F: SimdFloat>(&self, wi: Vectors<F>) -> Colors<F> {
+        let [u, v] = self.grid.uv(self.orientation.up.to_map(wi));
+        Colors(F::each([u, v], |uv| {
+            let Texel { column, row } = self.grid.texel_at(uv);
+            self.map.get(column, row).to_array()
+        }))
     }
 
     /// Radiance from `wi`, interpolated between texel centers. It is for the background that the
@@ -506,36 +525,26 @@ impl Environment {
 
     /// [`Environment::le`] and [`Environment::pdf`] with a single look-up.
     pub fn le_pdf(&self, wi: Vec3) -> (Rgb, f32) {
-        let t = self.texel(wi);
-        let le = self.map.get(t.column, t.row);
+        let le = self.le(wi);
         (le, self.density(le))
     }
 
     /// Samples a direction with density proportional to luminance; `None` for a black map.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Option<EnvironmentSample> {
-        self.sample_table(self.table.as_ref()?, u, |le| self.density(le))
+        self.light_density().sample(self, u)
     }
 
-    /// Samples any table over this map's texels. `density` maps a texel's radiance to its density.
+    /// The density proportional to luminance.
     #[inline]
-    fn sample_table(
-        &self,
-        table: &HierarchicalTable,
-        u: Vec2,
-        density: impl FnOnce(Rgb) -> f32,
-    ) -> Option<EnvironmentSample> {
-        let drawn = table.sample(u);
-        let texel = Texel { column: drawn.column, row: drawn.row };
-        let wi = self.orientation.up.to_world(self.grid.direction_inside(texel, drawn.inside));
-        let le = self.map.get(texel.column, texel.row);
-        let pdf = density(le);
-        (pdf > 0.0).then_some(EnvironmentSample { wi, le, pdf })
+    pub(crate) fn light_density(&self) -> LightDensity<'_> {
+        let Self { ref table, inverse_power, .. } = *self;
+        LightDensity { table: table.as_ref(), floor: 0.0, inverse_total: inverse_power }
     }
 
     /// A texel's probability divided by its solid angle. The solid angle in the weight cancels.
     pub(crate) fn density(&self, le: Rgb) -> f32 {
-        le.luminance() * self.inverse_power
+        self.light_density().pdf(Colors::from(le))
     }
 
     /// The distance from a texel's edge, in texels, within which a rounded direction may look up a neighbor.
@@ -648,29 +657,53 @@ impl Grid {
 
     /// The direction at `u` in [0, 1] across the map and polar cosine `cos_theta`.
     fn direction(&self, u: f64, cos_theta: f64) -> Vec3 {
+        direction_at(self.turn(u), cos_sin(cos_theta)).into()
+    }
+
+    /// The longitude at `u` in [0, 1] across the map, from −Z toward +X, in [−½, ½] turns.
+    #[inline(always)]
+    fn turn(&self, u: f64) -> f32 {
         let turn = u - 0.5 - f64::from(self.turn);
-        let phi = ((turn - turn.round()) * std::f64::consts::TAU) as f32;
-        let sin_theta = ((1.0 - cos_theta) * (1.0 + cos_theta)).max(0.0).sqrt() as f32;
-        let (sin_phi, cos_phi) = functions::sin_cos(phi);
-        vec3(sin_phi * sin_theta, cos_theta as f32, -cos_phi * sin_theta)
+        (turn - (turn + 0.5).floor()) as f32
     }
 
-    /// The direction at `inside` a texel, uniform in solid angle: linear in φ and cos θ.
-    #[inline]
-    fn direction_in(&self, t: Texel, inside: Vec2) -> Vec3 {
-        let u = (t.column as f64 + f64::from(inside.x)) / self.texels.width() as f64;
-        let (top, bottom) = (self.texels.cos_edge(t.row), self.texels.cos_edge(t.row + 1));
-        self.direction(u, top + f64::from(inside.y) * (bottom - top))
+    /// The directions at `inside` texels, uniform in solid angle: linear in φ and cos θ.
+    #[inline(always)]
+    fn directions_in<F: SimdFloat>(&self, column: F, row: F, [x, y]: [F; 2]) -> Vectors<F> {
+        let width = self.texels.width() as f64;
+        let [turn] = F::each([column, x], |[column, x]| {
+            [self.turn((f64::from(column) + f64::from(x)) / width)]
+        });
+        let polar = F::each([row, y], |[row, y]| {
+            let row = row as u32 as usize;
+            let (top, bottom) = (self.texels.cos_edge(row), self.texels.cos_edge(row + 1));
+            cos_sin(top + f64::from(y) * (bottom - top))
+        });
+        direction_at(turn, polar)
     }
 
-    /// Like [`Grid::direction_in`], but never rounded into a neighbor: the direction looks up the
-    /// texel that was sampled.
-    #[inline]
-    fn direction_inside(&self, t: Texel, inside: Vec2) -> Vec3 {
-        let wi = self.direction_in(t, inside);
+    /// Like [`Grid::directions_in`], but never rounded into a neighbor: a direction looks up the texel that was
+    /// sampled.
+    #[inline(always)]
+    fn directions_inside<F: SimdFloat>(&self, column: F, row: F, inside: [F; 2]) -> Vectors<F> {
+        let wi = self.directions_in(column, row, inside);
+        let [x, y] = inside;
         let (low, high) = (self.margin, Vec2::ONE - self.margin);
-        let safe = inside.cmpge(low).all() && inside.cmple(high).all();
-        if safe || self.texel(wi) == t { wi } else { self.direction_in(t, inside.clamp(low, high)) }
+        let (left, right) = (x.splat(low.x), x.splat(high.x));
+        let (top, bottom) = (y.splat(low.y), y.splat(high.y));
+        let near_edge = x.lt(left) | right.lt(x) | y.lt(top) | bottom.lt(y);
+        if near_edge.bits() == 0 {
+            return wi;
+        }
+        let [u, v] = self.uv(wi);
+        let [looked_up_column, looked_up_row] = F::each([u, v], |uv| {
+            let Texel { column, row } = self.texel_at(uv);
+            [column as f32, row as f32]
+        });
+        let is_same = looked_up_column.eq(column) & looked_up_row.eq(row);
+        // SimdFloat's comparisons, because `f32::clamp` is a call in WebAssembly.
+        let inside = [x.max(left).min(right), y.max(top).min(bottom)];
+        Vectors::select(is_same, wi, self.directions_in(column, row, inside))
     }
 
     #[inline(always)]
@@ -685,12 +718,32 @@ impl Grid {
     }
 
     fn texel(&self, d: Vec3) -> Texel {
-        let [u, v] = self.uv(d.into());
+        self.texel_at(self.uv(d.into()))
+    }
+
+    /// The texel at a position in [0, 1]².
+    #[inline(always)]
+    fn texel_at(&self, [u, v]: [f32; 2]) -> Texel {
         let (width, height) = (self.texels.width(), self.texels.height());
         let column = ((u * width as f32) as usize).min(width - 1);
         let row = ((v * height as f32) as usize).min(height - 1);
         Texel { column, row }
     }
+}
+
+/// The direction at a longitude [turns] and the cosine and sine of a polar angle.
+#[inline(always)]
+fn direction_at<F: SimdFloat>(turn: F, [cos_theta, sin_theta]: [F; 2]) -> Vectors<F> {
+    let [sin_phi, cos_phi] = sin_cos_half_turns(turn);
+    let back = turn.splat(0.0) - cos_phi;
+    Vectors { x: sin_phi * sin_theta, y: cos_theta, z: back * sin_theta }
+}
+
+/// The cosine and the sine of a polar angle.
+#[inline(always)]
+fn cos_sin(cos_theta: f64) -> [f32; 2] {
+    let squared = (1.0 - cos_theta) * (1.0 + cos_theta);
+    [cos_theta as f32, (if squared > 0.0 { squared } else { 0.0 }).sqrt() as f32]
 }
 
 #[cfg(test)]

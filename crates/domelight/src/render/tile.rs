@@ -804,9 +804,13 @@ impl<'a, S: Strategy> StrategyContext<'a, S> {
         samples: &'a [u32],
         pixels: &'a [PixelPoints],
     ) -> TileShading<'a> {
-        let portals = self.context.scene.portals();
-        let &Self { width, brightness, .. } = self;
-        TileShading { points, samples, pixels, width, portals, brightness }
+        let scene = self.context.scene;
+        TileShading {
+            portals: scene.portals(),
+            brightness: self.brightness,
+            instruction_set: scene.bvh().instruction_set(),
+            ..TileShading::new(points, samples, pixels, self.width)
+        }
     }
 }
 

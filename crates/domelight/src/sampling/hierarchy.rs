@@ -15,7 +15,7 @@
 
 use super::ONE_MINUS_EPSILON;
 use super::table::{TableError, TableSample};
-use crate::math::{Vec2, vec2};
+use crate::math::Vec2;
 use crate::simd::SimdFloat;
 
 /// Four cells: upper left, upper right, lower left, lower right.
@@ -109,31 +109,51 @@ impl HierarchicalTable {
     /// Samples a cell, and a position in it, with a point in [0, 1)². A cell with weight zero is never
     /// sampled.
     pub fn sample(&self, u: Vec2) -> TableSample {
-        let (mut column, mut row, mut x, mut y) = (0, 0, u.x, u.y);
-        let mut weight = 0.0;
+        let CellLanes { column, row, inside, weight } = self.sample_lanes(u.to_array());
+        let pmf = f64::from(weight) / self.total;
+        TableSample { column: column as usize, row: row as usize, inside: inside.into(), pmf }
+    }
+
+    /// [`HierarchicalTable::sample`] with one point or several side by side.
+    #[inline(always)]
+    pub(crate) fn sample_lanes<F: SimdFloat>(&self, [mut x, mut y]: [F; 2]) -> CellLanes<F> {
+        let (zero, one) = (x.splat(0.0), x.splat(1.0));
+        let (mut column, mut row, mut weight) = (zero, zero, zero);
         for level in self.levels.iter().rev() {
-            let [a, b, c, d] = level.quads[row * level.width + column];
-            let lower = split(&mut y, a + b, c + d);
-            let (left, right) = if lower { (c, d) } else { (a, b) };
-            let later = split(&mut x, left, right);
-            weight = if later { right } else { left };
-            column = 2 * column + usize::from(later);
-            row = 2 * row + usize::from(lower);
+            let quad = |[column, row]: [f32; 2]| {
+                level.quads[row as u32 as usize * level.width + column as u32 as usize]
+            };
+            let [a, b, c, d] = F::each([column, row], quad);
+            let (lower, within) = split(y, a + b, c + d);
+            let (left, right) = (F::select(lower, c, a), F::select(lower, d, b));
+            y = within;
+            let (later, within) = split(x, left, right);
+            x = within;
+            weight = F::select(later, right, left);
+            column = column + column + F::select(later, one, zero);
+            row = row + row + F::select(lower, one, zero);
         }
-        TableSample { column, row, inside: vec2(x, y), pmf: f64::from(weight) / self.total }
+        CellLanes { column, row, inside: [x, y], weight }
     }
 }
 
-/// Whether `u` falls into the second of two parts, not both of weight zero; stretches that part
-/// over [0, 1).
-#[inline]
-fn split(u: &mut f32, first: f32, second: f32) -> bool {
-    let at = *u * (first + second);
-    let beyond = at >= first && second > 0.0;
-    let stretched = if beyond { (at - first) / second } else { at / first };
-    // A comparison, because `f32::min` is a call in WebAssembly.
-    *u = SimdFloat::min(stretched, ONE_MINUS_EPSILON);
-    beyond
+/// Sampled cells, one per lane. Columns and rows are whole numbers below 2²⁴.
+pub(crate) struct CellLanes<F> {
+    pub(crate) column: F,
+    pub(crate) row: F,
+    /// The position in the cell, in [0, 1)².
+    pub(crate) inside: [F; 2],
+    weight: F,
+}
+
+/// Whether `u` falls into the second of two parts, not both of weight zero, and its position in that part, in [0, 1).
+#[inline(always)]
+fn split<F: SimdFloat>(u: F, first: F, second: F) -> (F::Mask, F) {
+    let zero = u.splat(0.0);
+    let at = u * (first + second);
+    let beyond = first.le(at) & zero.lt(second);
+    let stretched = F::select(beyond, at - first, at) / F::select(beyond, second, first);
+    (beyond, stretched.min(u.splat(ONE_MINUS_EPSILON)))
 }
 
 impl Level {
@@ -191,6 +211,7 @@ impl Level {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::vec2;
     use crate::sampling::Pcg32;
 
     fn table(width: usize, weights: &[f32]) -> Result<HierarchicalTable, TableError> {

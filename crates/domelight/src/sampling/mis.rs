@@ -5,6 +5,8 @@
 //! sum to one must not be combined with a common factor 1/(M + N): two techniques with M = N samples
 //! would then give exactly half the result.
 
+use crate::simd::SimdFloat;
+
 /// The heuristic that computes a sample's weight from the densities of the techniques.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Heuristic {
@@ -21,15 +23,22 @@ impl Heuristic {
     ///
     /// A technique with an infinite density gets weight 1, and an impossible sample gets 0.
     pub fn weight(self, n_pdf: f32, other: f32) -> f32 {
-        if n_pdf <= 0.0 {
-            return 0.0;
-        }
+        self.weight_lanes(n_pdf, other)
+    }
+
+    /// [`Heuristic::weight`] of one sample or of several side by side.
+    #[inline(always)]
+    pub(crate) fn weight_lanes<F: SimdFloat>(self, n_pdf: F, other: F) -> F {
+        let (zero, one, infinity) =
+            (other.splat(0.0), other.splat(1.0), other.splat(f32::INFINITY));
         // The ratio keeps the squares in range: neither ∞² nor ∞ / ∞ can come up.
-        let ratio = if other.is_infinite() && n_pdf.is_infinite() { 1.0 } else { other / n_pdf };
-        match self {
-            Self::Balance => 1.0 / (1.0 + ratio),
-            Self::Power => 1.0 / (1.0 + ratio * ratio),
-        }
+        let are_infinite = infinity.le(n_pdf) & infinity.le(other);
+        let ratio = F::select(are_infinite, one, other / n_pdf);
+        let term = match self {
+            Self::Balance => ratio,
+            Self::Power => ratio * ratio,
+        };
+        F::select(zero.lt(n_pdf), one / (one + term), zero)
     }
 }
 

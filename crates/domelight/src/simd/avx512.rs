@@ -194,6 +194,7 @@ macro_rules! real {
     ($type:ident, $mask:ident, $set1:ident, $min:ident, $max:ident, $cmp:ident, $sqrt:ident, $blend:ident, $loadu:ident) => {
         impl SimdFloat for $type {
             type Mask = $mask;
+            const N_LANES: usize = size_of::<$type>() / size_of::<f32>();
 
             #[inline(always)]
             fn splat(self, x: f32) -> Self {

@@ -152,6 +152,8 @@ pub trait SimdFloat:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     type Mask: LaneMask;
+    /// The number of lanes.
+    const N_LANES: usize;
 
     /// `x` in every lane.
     fn splat(self, x: f32) -> Self;
@@ -182,6 +184,17 @@ pub trait SimdFloat:
     #[inline(always)]
     fn abs(self) -> Self {
         self.max(self.splat(0.0) - self)
+    }
+
+    /// Computes numbers lane by lane, from the index of the lane.
+    #[inline(always)]
+    fn by_lane<const N: usize>(self, mut f: impl FnMut(usize) -> [f32; N]) -> [Self; N] {
+        let mut lane = 0;
+        Self::each([self], |_| {
+            let numbers = f(lane);
+            lane += 1;
+            numbers
+        })
     }
 
     /// Applies a function of one number lane by lane.

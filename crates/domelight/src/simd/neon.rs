@@ -141,6 +141,7 @@ operator!(BitOr, bitor, Mask8, vorrq_u32);
 
 impl SimdFloat for F32x8 {
     type Mask = Mask8;
+    const N_LANES: usize = LANES;
 
     #[inline(always)]
     fn splat(self, x: f32) -> Self {

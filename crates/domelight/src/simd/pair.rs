@@ -29,6 +29,7 @@ operator!(BitOr, bitor);
 
 impl<F: SimdFloat> SimdFloat for Pair<F> {
     type Mask = Pair<F::Mask>;
+    const N_LANES: usize = 2 * F::N_LANES;
 
     #[inline(always)]
     fn splat(self, x: f32) -> Self {

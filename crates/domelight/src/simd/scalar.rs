@@ -80,6 +80,7 @@ operator!(BitOr, bitor, Mask8, |);
 
 impl SimdFloat for F32x8 {
     type Mask = Mask8;
+    const N_LANES: usize = LANES;
 
     #[inline(always)]
     fn splat(self, x: f32) -> Self {

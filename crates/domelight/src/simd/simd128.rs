@@ -187,6 +187,7 @@ operator!(BitOr, bitor, Mask8, v128_or);
 
 impl SimdFloat for F32x8 {
     type Mask = Mask8;
+    const N_LANES: usize = LANES;
 
     #[inline(always)]
     fn splat(self, x: f32) -> Self {

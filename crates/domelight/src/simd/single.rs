@@ -4,6 +4,7 @@ use super::{LaneMask, SimdFloat};
 
 impl SimdFloat for f32 {
     type Mask = bool;
+    const N_LANES: usize = 1;
 
     #[inline(always)]
     fn splat(self, x: f32) -> f32 {

@@ -137,6 +137,20 @@ impl<F: SimdFloat> Colors<F> {
         Self([r * x, g * x, b * x])
     }
 
+    /// The products of two colors.
+    #[inline(always)]
+    pub(crate) fn times(self, b: Self) -> Self {
+        self.zip(b, |a, b| a * b)
+    }
+
+    /// mask ? self : black.
+    #[inline(always)]
+    pub(crate) fn masked(self, mask: F::Mask) -> Self {
+        let [r, g, b] = self.0;
+        let zero = r.splat(0.0);
+        Self([F::select(mask, r, zero), F::select(mask, g, zero), F::select(mask, b, zero)])
+    }
+
     /// The Rec. 709 luminance.
     #[inline(always)]
     pub(crate) fn luminance(self) -> F {
@@ -170,7 +184,15 @@ impl<F: SimdF32x8> Colors<F> {
     }
 }
 
+impl From<Rgb> for Colors<f32> {
+    #[inline(always)]
+    fn from(color: Rgb) -> Self {
+        Self(color.to_array())
+    }
+}
+
 impl Colors<f32> {
+    #[inline(always)]
     pub(crate) fn single(self) -> Rgb {
         Rgb::from(self.0)
     }

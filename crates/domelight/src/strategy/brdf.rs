@@ -1,10 +1,11 @@
 //! BRDF sampling: directions in proportion to reflectance, regardless of the light.
 
-use super::{PointStrategy, SampleIndex, ShadingPoint};
+use super::multi_sample::{Count, MultiSample, SampleScratch};
+use super::{Contributions, PointStrategy, SampleIndex, ShadingPoint, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::Vec3;
-use crate::sampling::Dimension;
+use crate::sampling::Heuristic;
 
 /// (1/N) Σ f_r cos θ · L / p_brdf: best for narrow lobes under wide light.
 #[derive(Clone, Copy, Debug)]
@@ -15,8 +16,20 @@ pub struct BrdfSampling<'a> {
     pub n_samples: u32,
 }
 
+impl BrdfSampling<'_> {
+    fn samples(&self) -> MultiSample<'_> {
+        MultiSample {
+            environment: self.environment,
+            light: self.environment.light_density(),
+            n_light: Count::fixed(0),
+            n_brdf: Count::fixed(self.n_samples),
+            heuristic: Heuristic::Balance,
+        }
+    }
+}
+
 impl PointStrategy for BrdfSampling<'_> {
-    type Scratch = ();
+    type Scratch = SampleScratch;
 
     const UNBIASED: bool = true;
 
@@ -32,15 +45,18 @@ impl PointStrategy for BrdfSampling<'_> {
         &self,
         at: &ShadingPoint,
         sample_index: SampleIndex,
-        (): &mut (),
-        mut push: impl FnMut(Vec3, Rgb),
+        _: &mut SampleScratch,
+        push: impl FnMut(Vec3, Rgb),
     ) {
-        let n = self.n_samples;
-        for j in 0..n {
-            let u = sample_index.get(Dimension::Brdf, j, n);
-            if let Some(s) = at.sample(u.u_lobe(), u.u()) {
-                push(s.wi, s.value * self.environment.le(s.wi) / (s.pdf * n as f32));
-            }
-        }
+        self.samples().sample(at, sample_index, push);
+    }
+
+    fn sample_tile(
+        &self,
+        tile: &TileShading,
+        scratch: &mut SampleScratch,
+        out: &mut Contributions,
+    ) {
+        self.samples().sample_tile(tile, scratch, out);
     }
 }

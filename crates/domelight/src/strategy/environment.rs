@@ -1,10 +1,11 @@
 //! Environment sampling: directions in proportion to the light, regardless of the surface.
 
-use super::{PointStrategy, SampleIndex, ShadingPoint};
+use super::multi_sample::{Count, MultiSample, SampleScratch};
+use super::{Contributions, PointStrategy, SampleIndex, ShadingPoint, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::Vec3;
-use crate::sampling::Dimension;
+use crate::sampling::Heuristic;
 
 /// (1/N) Σ f_r cos θ · L / p_env: best for wide lobes under small bright lights.
 ///
@@ -17,8 +18,20 @@ pub struct EnvironmentSampling<'a> {
     pub n_samples: u32,
 }
 
+impl EnvironmentSampling<'_> {
+    fn samples(&self) -> MultiSample<'_> {
+        MultiSample {
+            environment: self.environment,
+            light: self.environment.light_density(),
+            n_light: Count::fixed(self.n_samples),
+            n_brdf: Count::fixed(0),
+            heuristic: Heuristic::Balance,
+        }
+    }
+}
+
 impl PointStrategy for EnvironmentSampling<'_> {
-    type Scratch = ();
+    type Scratch = SampleScratch;
 
     const UNBIASED: bool = true;
 
@@ -34,15 +47,18 @@ impl PointStrategy for EnvironmentSampling<'_> {
         &self,
         at: &ShadingPoint,
         sample_index: SampleIndex,
-        (): &mut (),
-        mut push: impl FnMut(Vec3, Rgb),
+        _: &mut SampleScratch,
+        push: impl FnMut(Vec3, Rgb),
     ) {
-        let n = self.n_samples;
-        for j in 0..n {
-            let u = sample_index.get(Dimension::Environment, j, n);
-            if let Some(s) = self.environment.sample(u.u()) {
-                push(s.wi, at.eval(s.wi) * s.le / (s.pdf * n as f32));
-            }
-        }
+        self.samples().sample(at, sample_index, push);
+    }
+
+    fn sample_tile(
+        &self,
+        tile: &TileShading,
+        scratch: &mut SampleScratch,
+        out: &mut Contributions,
+    ) {
+        self.samples().sample_tile(tile, scratch, out);
     }
 }

@@ -1,11 +1,12 @@
 //! Sampling both the environment and the BRDF, combined by multiple importance sampling: Veach &
 //! Guibas 1995, equation 10 (the multi-sample model; the weights sum to one for each direction).
 
-use super::{PointStrategy, SampleIndex, ShadingPoint};
+use super::multi_sample::{Count, MultiSample, SampleScratch};
+use super::{Contributions, PointStrategy, SampleIndex, ShadingPoint, TileShading};
 use crate::Rgb;
-use crate::environment::{CompensatedTable, Environment, EnvironmentSample};
-use crate::math::{Vec2, Vec3};
-use crate::sampling::{Dimension, Heuristic};
+use crate::environment::{CompensatedTable, Environment};
+use crate::math::Vec3;
+use crate::sampling::Heuristic;
 
 /// The density from which directions toward the light are sampled.
 #[derive(Clone, Debug)]
@@ -51,23 +52,23 @@ impl<'a> MultipleImportanceSampling<'a> {
         Ok(Self { environment, table, heuristic, n_environment, n_brdf })
     }
 
-    fn sample_light(&self, u: Vec2) -> Option<EnvironmentSample> {
-        match &self.table {
-            LightTable::Full => self.environment.sample(u),
-            LightTable::Compensated(table) => table.sample(self.environment, u),
-        }
-    }
-
-    fn le_pdf(&self, wi: Vec3) -> (Rgb, f32) {
-        match &self.table {
-            LightTable::Full => self.environment.le_pdf(wi),
-            LightTable::Compensated(table) => table.le_pdf(self.environment, wi),
+    fn samples(&self) -> MultiSample<'_> {
+        let light = match &self.table {
+            LightTable::Full => self.environment.light_density(),
+            LightTable::Compensated(table) => table.light_density(),
+        };
+        MultiSample {
+            environment: self.environment,
+            light,
+            n_light: Count::fixed(self.n_environment),
+            n_brdf: Count::fixed(self.n_brdf),
+            heuristic: self.heuristic,
         }
     }
 }
 
 impl PointStrategy for MultipleImportanceSampling<'_> {
-    type Scratch = ();
+    type Scratch = SampleScratch;
 
     const UNBIASED: bool = true;
 
@@ -83,23 +84,18 @@ impl PointStrategy for MultipleImportanceSampling<'_> {
         &self,
         at: &ShadingPoint,
         sample_index: SampleIndex,
-        (): &mut (),
-        mut push: impl FnMut(Vec3, Rgb),
+        _: &mut SampleScratch,
+        push: impl FnMut(Vec3, Rgb),
     ) {
-        let (m, n) = (self.n_environment, self.n_brdf);
-        for j in 0..m {
-            let u = sample_index.get(Dimension::Environment, j, m);
-            let Some(s) = self.sample_light(u.u()) else { continue };
-            let (value, pdf_brdf) = at.eval_pdf(s.wi);
-            let w = self.heuristic.weight(m as f32 * s.pdf, n as f32 * pdf_brdf);
-            push(s.wi, value * s.le * (w / (m as f32 * s.pdf)));
-        }
-        for j in 0..n {
-            let u = sample_index.get(Dimension::Brdf, j, n);
-            let Some(s) = at.sample(u.u_lobe(), u.u()) else { continue };
-            let (le, pdf_light) = self.le_pdf(s.wi);
-            let w = self.heuristic.weight(n as f32 * s.pdf, m as f32 * pdf_light);
-            push(s.wi, s.value * le * (w / (n as f32 * s.pdf)));
-        }
+        self.samples().sample(at, sample_index, push);
+    }
+
+    fn sample_tile(
+        &self,
+        tile: &TileShading,
+        scratch: &mut SampleScratch,
+        out: &mut Contributions,
+    ) {
+        self.samples().sample_tile(tile, scratch, out);
     }
 }

@@ -19,6 +19,8 @@ mod estimator;
 pub mod levels;
 mod light_set;
 mod mis;
+mod multi_sample;
+mod point_lanes;
 mod portal;
 mod prepared;
 pub mod product;
@@ -31,6 +33,7 @@ pub use environment::EnvironmentSampling;
 pub use estimator::Estimator;
 pub use light_set::LightSet;
 pub use mis::{CompensationNeedsBrdf, LightTable, MultipleImportanceSampling};
+pub use multi_sample::SampleScratch;
 pub use portal::{Portal, PortalError};
 pub use prepared::{PrepareError, PreparedStrategy};
 pub use product::ProductSampling;
@@ -42,6 +45,8 @@ pub use sir::{
     CandidatePilot, Candidates, RAY_COST, Resampling, SamplingImportanceResampling, SirScratch,
 };
 pub use spec::{StrategyError, StrategyKind, StrategyOptions, StrategySpec};
+
+pub use crate::simd::InstructionSet;
 
 use crate::Rgb;
 use crate::bsdf::{Brdf, Bsdf};
@@ -211,6 +216,19 @@ pub trait PointStrategy: Sync {
         scratch: &mut Self::Scratch,
         push: impl FnMut(Vec3, Rgb),
     );
+
+    /// Pushes the shadow rays of all points of a tile to `out`, point by point. The library's strategies compute
+    /// several points side by side, with the same result.
+    fn sample_tile(
+        &self,
+        tile: &TileShading,
+        scratch: &mut Self::Scratch,
+        out: &mut Contributions,
+    ) {
+        for (i, at, sample_index) in tile.each_point() {
+            self.sample(at, sample_index, scratch, |wi, weight| out.push(i, wi, weight));
+        }
+    }
 }
 
 /// The shading points of a tile, grouped by pixel.
@@ -229,6 +247,8 @@ pub struct TileShading<'a> {
     /// The mean luminance of the picture's surfaces, in multiples of the strategy's unit, if it is known: a hint about
     /// which errors are visible.
     pub brightness: Option<f32>,
+    /// The instruction set of strategies that compute several points side by side. It changes no result.
+    pub instruction_set: InstructionSet,
 }
 
 impl<'a> TileShading<'a> {
@@ -239,7 +259,22 @@ impl<'a> TileShading<'a> {
         pixels: &'a [PixelPoints],
         width: usize,
     ) -> Self {
-        Self { points, samples, pixels, width, portals: &[], brightness: None }
+        let instruction_set = InstructionSet::best();
+        Self { points, samples, pixels, width, portals: &[], brightness: None, instruction_set }
+    }
+
+    /// The points of all pixels in order, each with its index and its camera sample.
+    #[inline]
+    pub(crate) fn each_point(
+        &self,
+    ) -> impl Iterator<Item = (u32, &'a ShadingPoint, SampleIndex)> + use<'a> {
+        let Self { points, samples, pixels, .. } = *self;
+        pixels.iter().flat_map(move |pixel| {
+            pixel.points.clone().map(move |i| {
+                let sample_index = SampleIndex { sampler: pixel.sampler, sample: samples[i] };
+                (i as u32, &points[i], sample_index)
+            })
+        })
     }
 }
 
@@ -354,12 +389,6 @@ impl<S: PointStrategy> Strategy for S {
         scratch: &mut S::Scratch,
         out: &mut Contributions,
     ) {
-        for pixel in tile.pixels {
-            for i in pixel.points.clone() {
-                let sample_index = SampleIndex { sampler: pixel.sampler, sample: tile.samples[i] };
-                let push = |wi, weight| out.push(i as u32, wi, weight);
-                self.sample(&tile.points[i], sample_index, scratch, push);
-            }
-        }
+        self.sample_tile(tile, scratch, out);
     }
 }

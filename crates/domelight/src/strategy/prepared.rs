@@ -3,8 +3,8 @@
 use super::{
     BrdfSampling, CandidatePilot, CompensationNeedsBrdf, Contributions, EnvironmentSampling,
     LightSet, LightTable, MultipleImportanceSampling, ProductSampling, RejectionError,
-    RejectionSampling, SamplingImportanceResampling, ShadingPoint, Strategy, StrategySpec,
-    TileShading, product, rejection, sir,
+    RejectionSampling, SampleScratch, SamplingImportanceResampling, ShadingPoint, Strategy,
+    StrategySpec, TileShading, product, rejection, sir,
 };
 use crate::environment::{CompensatedTable, Environment};
 use crate::math::Vec3;
@@ -197,6 +197,7 @@ macro_rules! each {
 /// Scratch memory of [`PreparedStrategy`]. Only the part of the running strategy is allocated.
 #[derive(Debug, Default)]
 pub struct PreparedScratch {
+    samples: SampleScratch,
     product: product::ProductScratch,
     rejection: rejection::RejectionScratch,
     sir: sir::SirScratch,
@@ -248,9 +249,9 @@ impl Strategy for PreparedStrategy<'_> {
         out: &mut Contributions,
     ) {
         match self {
-            Self::Brdf(s) => s.push(&(), tile, round, &mut (), out),
-            Self::Environment(s) => s.push(&(), tile, round, &mut (), out),
-            Self::Mis(s) => s.push(&(), tile, round, &mut (), out),
+            Self::Brdf(s) => s.push(&(), tile, round, &mut scratch.samples, out),
+            Self::Environment(s) => s.push(&(), tile, round, &mut scratch.samples, out),
+            Self::Mis(s) => s.push(&(), tile, round, &mut scratch.samples, out),
             Self::Product(s) => {
                 let pool = pass.as_ref().expect("product draws a pool for each pass");
                 s.push(pool, tile, round, &mut scratch.product, out);

@@ -34,13 +34,17 @@
 //! stop would depend on the values), or from pixel to pixel (the points would no longer form one
 //! sequence).
 
-use super::{PointStrategy, SampleIndex, ShadingPoint};
+use super::multi_sample::{Count, MultiSample, SampleScratch};
+use super::{Contributions, PointStrategy, SampleIndex, ShadingPoint, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::{Vec3, functions};
 use crate::sampling::hilbert::hemisphere_index;
 use crate::sampling::rng::hash2;
-use crate::sampling::{Dimension, ONE_MINUS_EPSILON, Sampler, SamplerKind, WeightedReservoirs};
+use crate::sampling::{
+    Dimension, Heuristic, ONE_MINUS_EPSILON, Sampler, SamplerKind, WeightedReservoirs,
+};
+use crate::simd::InstructionSet;
 
 /// The density from which candidates are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,6 +115,7 @@ struct Candidate {
 /// Scratch memory of [`SamplingImportanceResampling`].
 #[derive(Clone, Debug, Default)]
 pub struct SirScratch {
+    samples: SampleScratch,
     candidates: Vec<Candidate>,
     /// The position on the curve in the upper half, the index of the candidate in the lower half.
     order: Vec<u64>,
@@ -120,40 +125,51 @@ pub struct SirScratch {
 }
 
 impl SamplingImportanceResampling<'_> {
-    /// Offers each candidate with a positive weight.
-    fn draw(&self, at: &ShadingPoint, sample_index: SampleIndex, mut add: impl FnMut(Candidate)) {
-        let (mut m, mut n) = self.candidates.split(self.n_candidates);
-        let expected = |count: u32, odd: f32| count as f32 + odd;
-        let is_odd = m + n < self.n_candidates;
-        let odd = if is_odd { 0.5 } else { 0.0 };
-        let (expected_m, expected_n) = (expected(m, odd), expected(n, odd));
-        // All samples of the pixel share a sequence, so each reserves the same number of points.
-        let (numbers_m, numbers_n) = (m + u32::from(is_odd), n + u32::from(is_odd));
-        if is_odd {
-            // Choose the source of the odd candidate with a number that no direction uses.
-            let coin = sample_index.get(Dimension::Environment, m, numbers_m).u_lobe();
-            if coin < 0.5 { m += 1 } else { n += 1 }
-        }
-        let mut add = |wi, value: Rgb, density: f32, index| {
-            let value = value / density;
-            let weight = value.luminance();
-            if weight != 0.0 {
-                add(Candidate { wi, value, weight, index });
+    /// The samples that become candidates at one point.
+    fn samples(&self, sample_index: SampleIndex) -> MultiSample<'_> {
+        let (m, n) = self.candidates.split(self.n_candidates);
+        let [mut n_light, mut n_brdf] = [Count::fixed(m), Count::fixed(n)];
+        if m + n < self.n_candidates {
+            for count in [&mut n_light, &mut n_brdf] {
+                count.expected += 0.5;
+                // All samples of the pixel share a sequence, so each reserves the same number of points.
+                count.reserved += 1;
             }
-        };
-        for j in 0..m {
-            let u = sample_index.get(Dimension::Environment, j, numbers_m);
-            let Some(s) = self.environment.sample(u.u()) else { continue };
-            let mixed = expected_n > 0.0;
-            let (value, pdf) = if mixed { at.eval_pdf(s.wi) } else { (at.eval(s.wi), 0.0) };
-            add(s.wi, value * s.le, expected_m * s.pdf + expected_n * pdf, j);
+            // Choose the source of the odd candidate with a number that no direction uses.
+            let coin = sample_index.get(Dimension::Environment, m, n_light.reserved).u_lobe();
+            let chosen = if coin < 0.5 { &mut n_light } else { &mut n_brdf };
+            chosen.n += 1;
         }
-        for j in 0..n {
-            let u = sample_index.get(Dimension::Brdf, j, numbers_n);
-            let Some(s) = at.sample(u.u_lobe(), u.u()) else { continue };
-            let (le, pdf) = self.environment.le_pdf(s.wi);
-            add(s.wi, s.value * le, expected_m * pdf + expected_n * s.pdf, m + j);
-        }
+        let (environment, light) = (self.environment, self.environment.light_density());
+        MultiSample { environment, light, n_light, n_brdf, heuristic: Heuristic::Balance }
+    }
+
+    /// Draws the candidates of positive weight into scratch memory.
+    fn draw(
+        &self,
+        instruction_set: InstructionSet,
+        at: &ShadingPoint,
+        sample_index: SampleIndex,
+        scratch: &mut SirScratch,
+    ) {
+        let SirScratch { samples, candidates, reservoirs, .. } = scratch;
+        let (mut generator, n) = (sample_index.generator(), self.n_samples as usize);
+        let streams = self.resampling == Resampling::Reservoir;
+        candidates.clear();
+        reservoirs.clear();
+        let drawn = self.samples(sample_index);
+        drawn.sample_each(instruction_set, at, sample_index, samples, |wi, value, index| {
+            let weight = value.luminance();
+            if weight == 0.0 {
+                return;
+            }
+            let candidate = Candidate { wi, value, weight, index };
+            if streams {
+                reservoirs.add(candidate, f64::from(weight), n, &mut generator);
+            } else {
+                candidates.push(candidate);
+            }
+        });
     }
 
     fn fill_ticks(&self, sample_index: SampleIndex, ticks: &mut Vec<f32>) {
@@ -170,6 +186,7 @@ impl SamplingImportanceResampling<'_> {
         }
     }
 
+    /// Picks from the candidates in `scratch`.
     fn pick_stored(
         &self,
         at: &ShadingPoint,
@@ -178,8 +195,6 @@ impl SamplingImportanceResampling<'_> {
         mut push: impl FnMut(Vec3, Rgb),
     ) {
         let SirScratch { candidates, order, ticks, .. } = scratch;
-        candidates.clear();
-        self.draw(at, sample_index, |c| candidates.push(c));
         let total = candidates.iter().map(|c| f64::from(c.weight)).sum();
         if !f64::is_finite(total) {
             // Pass overflow on to the film, which counts it.
@@ -202,24 +217,34 @@ impl SamplingImportanceResampling<'_> {
         }
     }
 
-    fn pick_streaming(
-        &self,
-        at: &ShadingPoint,
-        sample_index: SampleIndex,
-        scratch: &mut SirScratch,
-        mut push: impl FnMut(Vec3, Rgb),
-    ) {
+    /// Picks from the candidates in the reservoirs of `scratch`.
+    fn pick_streamed(&self, scratch: &mut SirScratch, mut push: impl FnMut(Vec3, Rgb)) {
         let SirScratch { candidates: picked, reservoirs, .. } = scratch;
-        let n = self.n_samples as usize;
-        let mut generator = sample_index.generator();
-        reservoirs.clear();
-        self.draw(at, sample_index, |c| reservoirs.add(c, f64::from(c.weight), n, &mut generator));
         picked.clear();
         picked.extend(reservoirs.items());
         picked.sort_unstable_by_key(|c| c.index);
         for same in picked.chunk_by(|a, b| a.index == b.index) {
-            let (wi, weight) = same[0].picked(same.len(), n, reservoirs.total());
+            let (wi, weight) =
+                same[0].picked(same.len(), self.n_samples as usize, reservoirs.total());
             push(wi, weight);
+        }
+    }
+
+    /// [`PointStrategy::sample`] with an instruction set.
+    fn sample_with(
+        &self,
+        instruction_set: InstructionSet,
+        at: &ShadingPoint,
+        sample_index: SampleIndex,
+        scratch: &mut SirScratch,
+        push: impl FnMut(Vec3, Rgb),
+    ) {
+        self.draw(instruction_set, at, sample_index, scratch);
+        match self.resampling {
+            Resampling::Reservoir => self.pick_streamed(scratch, push),
+            Resampling::Multinomial | Resampling::Systematic | Resampling::SystematicSorted => {
+                self.pick_stored(at, sample_index, scratch, push);
+            }
         }
     }
 }
@@ -274,9 +299,13 @@ impl PointStrategy for SamplingImportanceResampling<'_> {
         scratch: &mut SirScratch,
         push: impl FnMut(Vec3, Rgb),
     ) {
-        match self.resampling {
-            Resampling::Reservoir => self.pick_streaming(at, sample_index, scratch, push),
-            _ => self.pick_stored(at, sample_index, scratch, push),
+        self.sample_with(InstructionSet::best(), at, sample_index, scratch, push);
+    }
+
+    fn sample_tile(&self, tile: &TileShading, scratch: &mut SirScratch, out: &mut Contributions) {
+        for (i, at, sample_index) in tile.each_point() {
+            let push = |wi, weight| out.push(i, wi, weight);
+            self.sample_with(tile.instruction_set, at, sample_index, scratch, push);
         }
     }
 }
