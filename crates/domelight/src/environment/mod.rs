@@ -552,10 +552,6 @@ impl Environment {
         self.grid.margin
     }
 
-    fn texel(&self, wi: Vec3) -> Texel {
-        self.grid.texel(self.orientation.up.to_map(wi.into()).into())
-    }
-
     /// The direction of a position on the map, in texels from its upper left corner, in the map's own
     /// frame with +Y up. Positions within a texel are uniform in cos θ, and so in solid angle.
     pub(crate) fn map_direction(&self, column: f64, row: f64) -> Vec3 {
@@ -581,7 +577,8 @@ impl Environment {
     /// The column and the row that `wi` looks up.
     #[cfg(any(test, feature = "render"))]
     pub(crate) fn texel_at(&self, wi: Vec3) -> [usize; 2] {
-        let Texel { column, row } = self.texel(wi);
+        let wi = self.orientation.up.to_map(wi.into());
+        let Texel { column, row } = self.grid.texel(wi.into());
         [column, row]
     }
 
@@ -749,7 +746,7 @@ fn cos_sin(cos_theta: f64) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::vec2;
+    use crate::math::{vec2, vec3};
     use crate::sampling::Pcg32;
 
     fn noise(width: usize, height: usize, seed: u64) -> RgbImage {
