@@ -132,6 +132,8 @@ export class Job {
   ended = false;
   /** Whether the engines know where to stop, and those that have stopped there. */
   budgeted = false;
+  /** Whether its budget was known when it began. */
+  begunWithBudget = false;
   private spent = new Set<Host>();
 
   /** An engine has spent its budget or all samples; returns whether that ends the job. */

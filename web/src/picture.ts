@@ -281,9 +281,9 @@ export class PicturePanel {
       // The estimate was too low: now the number of rays per sample is known.
       if (b.isWhole && rays[1] < 0.98 * rays[0]) this.replaceRight(b.settings.spp * rays[0] / Math.max(rays[1], 1));
       // A busy page has heard too late that the left picture is done: the right one starts anew, and knows its end.
-      else if (!b.budgeted && b.settings.spp > 1 && rays[1] > 1.02 * rays[0]) {
+      else if (!b.begunWithBudget && b.settings.spp > 1 && rays[1] > 1.02 * rays[0]) {
         this.replaceRight(b.settings.spp, 1);
-        engines.endAt(this.jobs[1], rays[0], b);
+        this.jobs[1].begunWithBudget = engines.endAt(this.jobs[1], rays[0], b);
       }
       return;
     }
