@@ -36,7 +36,9 @@
 //! use domelight::environment::{Environment, Orientation, builtin::BuiltinProbe};
 //! use domelight::math::{Frame, Vec3};
 //! use domelight::sampling::{SamplerKind, Sampler};
-//! use domelight::strategy::{EnvironmentSampling, PointStrategy, SampleIndex, ShadingPoint};
+//! use domelight::strategy::{
+//!     EnvironmentSampling, PointStrategy, SampleIndex, SampleScratch, ShadingPoint,
+//! };
 //! use domelight::Rgb;
 //!
 //! let map = BuiltinProbe::Sky.image(64);
@@ -49,7 +51,8 @@
 //! let sampler = Sampler::new(SamplerKind::Sobol, 0, 0);
 //! let mut unoccluded = Rgb::BLACK;
 //! let numbers = SampleIndex { sampler, sample: 0 };
-//! strategy.sample(&at, numbers, &mut (), |_wi, weight| unoccluded += weight);
+//! let mut scratch = SampleScratch::default();
+//! strategy.sample(&at, numbers, &mut scratch, |_wi, weight| unoccluded += weight);
 //! assert!(unoccluded.luminance() > 0.0);
 //! # Ok::<(), domelight::environment::EnvironmentError>(())
 //! ```
