@@ -143,6 +143,13 @@ impl<F: SimdFloat> Colors<F> {
         self.zip(b, |a, b| a * b)
     }
 
+    /// Divided by a number.
+    #[inline(always)]
+    pub(crate) fn divided(self, x: F) -> Self {
+        let [r, g, b] = self.0;
+        Self([r / x, g / x, b / x])
+    }
+
     /// mask ? self : black.
     #[inline(always)]
     pub(crate) fn masked(self, mask: F::Mask) -> Self {

@@ -176,8 +176,8 @@ impl MultiSample<'_> {
         };
         let has_density = zero.lt(own) & own.le(zero.splat(f32::MAX));
         let is_drawn = has_density & zero.lt(at.ng.dot_each(wi));
-        let weight = self.heuristic.weight_lanes(own, other) / own;
-        (wi, value.times(le).scaled(weight).masked(is_drawn))
+        let weight = self.heuristic.weight_lanes(own, other);
+        (wi, value.times(le).divided(own).scaled(weight).masked(is_drawn))
     }
 }
 
