@@ -4,6 +4,7 @@ use domelight::Rgb;
 use domelight::bsdf::{self, Brdf as _, BrdfSample, CustomLobe};
 use domelight::math::{Vec2, Vec3};
 use numpy::PyArrayDyn;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
@@ -262,9 +263,7 @@ impl Bsdf {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         match &slf.get().text {
             Some(text) => Ok((slf.get_type().getattr("parse")?, (text.clone(),))),
-            None => {
-                Err(pyo3::exceptions::PyTypeError::new_err("a BSDF of functions cannot be pickled"))
-            }
+            None => Err(PyTypeError::new_err("a BSDF of functions cannot be pickled")),
         }
     }
 }
@@ -308,11 +307,30 @@ pub(crate) struct Material {
 }
 
 /// A BSDF, a material or the text of one.
-#[derive(FromPyObject)]
 pub(crate) enum MaterialLike {
     Text(String),
     Bsdf(Py<Bsdf>),
     Material(Py<Material>),
+}
+
+impl<'py> FromPyObject<'_, 'py> for MaterialLike {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(text) = value.extract() {
+            return Ok(Self::Text(text));
+        }
+        if let Ok(bsdf) = value.cast::<Bsdf>() {
+            return Ok(Self::Bsdf(bsdf.to_owned().unbind()));
+        }
+        if let Ok(material) = value.cast::<Material>() {
+            return Ok(Self::Material(material.to_owned().unbind()));
+        }
+        Err(PyTypeError::new_err(format!(
+            "{} is no material; give a text such as 'diffuse:0.5', a Bsdf or a Material",
+            value.repr()?
+        )))
+    }
 }
 
 impl MaterialLike {

@@ -44,7 +44,8 @@ impl WorkProgress for Progress<'_> {
 
 impl Host for PythonHost<'_> {
     fn warn(&self, text: &str) {
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
+        let text = text.replace("--reference-spp", "reference_spp");
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text);
     }
 
     fn work_progress<'a>(&'a self) -> Option<Box<dyn WorkProgress + 'a>> {

@@ -7,7 +7,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use pyo3::exceptions::PyRuntimeError;
@@ -59,6 +59,32 @@ pub(crate) fn parallel_on<T: Send>(
         let pool = pool(n, &failure)?;
         let result = caught(|| pool.install(f));
         failure.take().map_or(result, Err)
+    })
+}
+
+/// Computes without holding the interpreter, on all cores, until a signal's handler raises. The computation, which cannot
+/// end early, then finishes in the background, and its result is dropped.
+pub(crate) fn abandonable<T: Send + 'static>(
+    py: Python<'_>,
+    f: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let n = n_threads(None)?;
+    py.detach(|| {
+        let pool = pool(n, &Arc::default())?;
+        let (sender, results) = mpsc::channel();
+        std::thread::spawn(move || {
+            // Nobody receives it after a signal.
+            let _ = sender.send(caught(|| pool.install(f)));
+        });
+        loop {
+            match results.recv_timeout(POLL) {
+                Ok(result) => return result,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(PyRuntimeError::new_err("the computation has ended with an error"));
+                }
+                Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
+            }
+        }
     })
 }
 

@@ -1,5 +1,6 @@
 //! Environments and densities over them.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -10,11 +11,12 @@ use domelight::environment::{self, EnvironmentDensity, EnvironmentSample, Orient
 use domelight::{Rgb, RgbImage};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
-use pyo3::types::PyType;
+use pyo3::types::{PyBytes, PyType};
 
-use crate::arrays::{Floats, array, from_image, image, rows};
-use crate::engine::{alone, parallel};
+use crate::arrays::{Floats, array, from_image, hashable, image, rows};
+use crate::engine::{abandonable, alone, parallel};
 use crate::error::{bad_value, from_source, to_python, warn};
+use crate::picture::{depth, to_png, tone};
 
 /// The maximum number of rows of a built-in map, from the library's limit for pictures.
 const MAX_ROWS: usize = 16_384;
@@ -71,7 +73,8 @@ impl Environment {
         scale: f32,
         name: String,
     ) -> PyResult<Self> {
-        let inner = parallel(py, || environment::Environment::new(map, orientation, scale))?;
+        let inner =
+            abandonable(py, move || environment::Environment::new(map, orientation, scale))?;
         Ok(Self { inner: Arc::new(inner.map_err(to_python)?), name })
     }
 
@@ -91,7 +94,7 @@ fn watts(environment: &environment::Environment, radiance: Rgb) -> [f32; 3] {
 
 /// Loads a light probe's map from a file, and issues its warnings.
 pub(crate) fn load_map(py: Python<'_>, path: PathBuf, options: ProbeOptions) -> PyResult<RgbImage> {
-    let probe = parallel(py, || load_probe(&path, &options))?.map_err(to_python)?;
+    let probe = abandonable(py, move || load_probe(&path, &options))?.map_err(to_python)?;
     warn(py, &probe.warnings)?;
     Ok(probe.image)
 }
@@ -102,7 +105,7 @@ pub(crate) fn builtin_map(py: Python<'_>, name: &str, height: usize) -> PyResult
     if !(1..=MAX_ROWS).contains(&height) {
         return Err(bad_value(format!("rows is {height}; it must be from 1 to {MAX_ROWS}")));
     }
-    parallel(py, || probe.image(height))
+    abandonable(py, move || probe.image(height))
 }
 
 #[pymethods]
@@ -418,6 +421,19 @@ impl Environment {
         )
     }
 
+    /// The map, developed; at most 512 columns of it.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        const MOST_COLUMNS: usize = 512;
+        let map = self.inner.radiance_map();
+        let step = map.width.div_ceil(MOST_COLUMNS);
+        let bytes = parallel(py, || {
+            let small = reduced(&map, step);
+            to_png(&small, None, &tone(&small, None, None, "agx")?, depth(8)?)
+                .map_err(|e| from_source(&e))
+        })??;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
         let py = slf.py();
         let this = slf.get();
@@ -444,8 +460,22 @@ impl Environment {
     }
 }
 
+/// The means of `step` × `step` texels; at the right and lower borders of as many as there are.
+fn reduced(map: &RgbImage, step: usize) -> RgbImage {
+    RgbImage::from_fn(map.width.div_ceil(step), map.height.div_ceil(step), |x, y| {
+        let across = step * x..map.width.min(step * (x + 1));
+        let down = step * y..map.height.min(step * (y + 1));
+        let n = (across.len() * down.len()) as f32;
+        let texels = down.flat_map(|y| across.clone().map(move |x| (x, y)));
+        texels.fold(Rgb::BLACK, |sum, (x, y)| sum + map.get(x, y) * (1.0 / n))
+    })
+}
+
 /// The parts of a pickled environment: map, rotation, unit, axis and name.
 type Pickled<'py> = (Bound<'py, PyArrayDyn<f32>>, f32, f64, &'static str, String);
+
+/// The parts of a pickled density: environment and weights.
+type PickledDensity<'py> = (Bound<'py, Environment>, Bound<'py, PyArrayDyn<f32>>);
 
 /// Directions, radiance and densities.
 type Samples<'py> =
@@ -499,9 +529,14 @@ fn densities<'py>(
 /// ------
 /// ValueError
 ///     If the shape is not that of the map, or a weight is negative or not finite; the message names it.
+///
+/// Densities can be pickled and compared: they are equal if maps, orientations and weights are.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Density {
     environment: Arc<environment::Environment>,
+    /// The name of the environment.
+    name: String,
+    weights: Vec<f32>,
     density: EnvironmentDensity,
 }
 
@@ -510,16 +545,17 @@ impl Density {
     #[new]
     fn new(environment: &Bound<'_, Environment>, weights: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = weights.py();
-        let environment = environment.get().inner.clone();
+        let Environment { inner: environment, name } = environment.get();
         let weights = Floats::new("weights", weights)?;
         let map = environment.map();
         if weights.shape() != [map.height, map.width] {
             let expected = format!("({}, {}), that of the map", map.height, map.width);
             return Err(weights.bad_shape(&expected));
         }
-        let values = weights.values()?.to_vec();
-        let density = parallel(py, || EnvironmentDensity::new(&environment, values))?;
-        Ok(Self { density: density.map_err(|e| from_source(&e))?, environment })
+        let weights = weights.values()?.to_vec();
+        let density = parallel(py, || EnvironmentDensity::new(environment, weights.clone()))?;
+        let density = density.map_err(|e| from_source(&e))?;
+        Ok(Self { environment: environment.clone(), name: name.clone(), weights, density })
     }
 
     /// Sample directions from the density.
@@ -556,5 +592,34 @@ impl Density {
     fn __repr__(&self) -> String {
         let map = self.environment.map();
         format!("<Density over {} x {} texels>", map.width, map.height)
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| {
+            let Self { environment: ours, weights, .. } = self;
+            let Self { environment: theirs, weights: their_weights, .. } = other.get();
+            let is_same = Arc::ptr_eq(ours, theirs)
+                || ours.map() == theirs.map()
+                    && ours.orientation() == theirs.orientation()
+                    && ours.unit() == theirs.unit();
+            is_same && weights == their_weights
+        })
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.weights.iter().for_each(|&weight| hashable(weight).hash(&mut hasher));
+        hasher.finish()
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, PickledDensity<'py>)> {
+        let py = slf.py();
+        let Self { environment, name, weights, .. } = slf.get();
+        let map = environment.map();
+        let weights = array(py, weights.clone(), &[map.height, map.width])?;
+        let environment = Environment { inner: environment.clone(), name: name.clone() };
+        Ok((slf.get_type().into_any(), (Bound::new(py, environment)?, weights)))
     }
 }

@@ -62,11 +62,31 @@ pub(crate) fn from_panic(panic: &(dyn std::any::Any + Send)) -> PyErr {
     PyRuntimeError::new_err(format!("internal error of domelight, please report it: {text}"))
 }
 
-/// Issues warnings, which may raise exceptions.
+/// Issues warnings that point at the caller's line; they may raise exceptions.
 pub(crate) fn warn(py: Python<'_>, warnings: &[String]) -> PyResult<()> {
+    if warnings.is_empty() {
+        return Ok(());
+    }
+    let level = frames_of_package(py)? + 1;
     for text in warnings {
         let text = CString::new(text.replace('\0', "\u{fffd}"))?;
-        PyErr::warn(py, &py.get_type::<DomelightWarning>(), &text, 1)?;
+        PyErr::warn(py, &py.get_type::<DomelightWarning>(), &text, level)?;
     }
     Ok(())
+}
+
+/// The number of innermost frames that belong to this package. Functions in Rust have none.
+fn frames_of_package(py: Python<'_>) -> PyResult<i32> {
+    let Ok(mut frame) = py.import("sys")?.call_method0("_getframe") else { return Ok(0) };
+    let mut n = 0;
+    while !frame.is_none() {
+        let name = frame.getattr("f_globals")?.call_method1("get", ("__name__", ""))?;
+        let name: String = name.extract().unwrap_or_default();
+        if name != "domelight" && !name.starts_with("domelight.") {
+            return Ok(n);
+        }
+        n += 1;
+        frame = frame.getattr("f_back")?;
+    }
+    Ok(0)
 }

@@ -363,8 +363,17 @@ impl Film {
 
     fn __repr__(&self) -> String {
         let (height, width) = self.shape();
+        let counts = &self.layers().n_samples;
+        let taken: u64 = counts.iter().map(|&n| u64::from(n)).sum();
+        let taken = taken as f64 / counts.len().max(1) as f64;
         let state = if self.complete { "" } else { ", not complete" };
-        format!("<Film {width} x {height}: {}, {} samples{state}>", self.strategy, self.n_samples)
+        // One decimal, unless there are whole samples.
+        let taken = if taken.fract() == 0.0 { format!("{taken}") } else { format!("{taken:.1}") };
+        let asked = match self.n_samples.to_string() {
+            asked if asked == taken => String::new(),
+            asked => format!(" of {asked}"),
+        };
+        format!("<Film {width} x {height}: {}, {taken}{asked} samples{state}>", self.strategy)
     }
 
     fn __reduce__<'py>(

@@ -1,5 +1,6 @@
 //! Scenes and cameras.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
 use std::str::FromStr as _;
 use std::sync::Arc;
@@ -15,12 +16,13 @@ use domelight::scene::{
     Framing, Lens, LoadOptions, Material, NamedCamera, Part, Projection, SceneDescription,
 };
 use numpy::PyArrayDyn;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
-use crate::arrays::{Floats, array, indices, vector};
+use crate::arrays::{Floats, array, hashable, indices, vector};
 use crate::bsdf::MaterialLike;
-use crate::engine::parallel;
+use crate::engine::{abandonable, parallel};
 use crate::environment::{Environment, builtin_map, load_map, up_axis, up_name};
 use crate::error::{bad_value, from_source, to_python, warn};
 use crate::lobe::PythonLobe;
@@ -48,8 +50,10 @@ use crate::lobe::PythonLobe;
 ///     Distance along the axis at which the lens is sharp, positive; required with `aperture`.
 /// blades : int, default 0
 ///     Number of aperture blades; fewer than 3 mean a round aperture.
+///
+/// Cameras can be pickled and compared.
 #[pyclass(frozen, from_py_object, module = "domelight")]
-#[derive(Clone)]
+#[derive(Clone, PartialEq)]
 pub(crate) struct Camera {
     origin: Option<Vec3>,
     target: Option<Vec3>,
@@ -206,7 +210,60 @@ impl Camera {
         ];
         format!("Camera({})", parts.into_iter().flatten().collect::<Vec<_>>().join(", "))
     }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self == other.get())
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for v in [self.origin, self.target, self.up] {
+            v.map(|v| v.to_array().map(hashable)).hash(&mut hasher);
+        }
+        self.shift.map(hashable).hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, PickledCamera)> {
+        let this = slf.get();
+        let [origin, target, up] = [this.origin, this.target, this.up].map(|v| v.map(Into::into));
+        let lens = this.lens.map(|l| (l.radius, l.focus_distance, l.blades));
+        let state = (origin, target, up, this.fov(), this.ortho(), this.shift, lens);
+        Ok((slf.get_type().getattr("_restore")?, state))
+    }
+
+    #[classmethod]
+    fn _restore(
+        _cls: &Bound<'_, PyType>,
+        origin: Option<[f32; 3]>,
+        target: Option<[f32; 3]>,
+        up: Option<[f32; 3]>,
+        fov: Option<f32>,
+        ortho: Option<f32>,
+        shift: [f32; 2],
+        lens: Option<(f32, f32, u32)>,
+    ) -> Self {
+        let [origin, target, up] = [origin, target, up].map(|v| v.map(Vec3::from));
+        let perspective = fov.map(|fov_y_degrees| Projection::Perspective { fov_y_degrees });
+        let projection =
+            perspective.or_else(|| ortho.map(|height| Projection::Orthographic { height }));
+        let lens =
+            lens.map(|(radius, focus_distance, blades)| Lens { radius, focus_distance, blades });
+        Self { origin, target, up, projection, shift, lens }
+    }
 }
+
+/// The parts of a pickled camera: origin, target, up, field of view, height, shift, and aperture, distance and blades of the
+/// lens.
+type PickledCamera = (
+    Option<[f32; 3]>,
+    Option<[f32; 3]>,
+    Option<[f32; 3]>,
+    Option<f32>,
+    Option<f32>,
+    [f32; 2],
+    Option<(f32, f32, u32)>,
+);
 
 /// The lens of an aperture and a focus distance.
 fn lens(aperture: Option<f32>, focus_distance: Option<f32>, blades: u32) -> PyResult<Option<Lens>> {
@@ -234,11 +291,30 @@ fn from_vector(py: Python<'_>, v: Option<Vec3>) -> PyResult<Option<Bound<'_, PyA
 }
 
 /// A camera, or the name or number of one of the scene's cameras.
-#[derive(FromPyObject)]
 pub(crate) enum CameraLike {
     Camera(Camera),
     Number(usize),
     Name(String),
+}
+
+impl<'py> FromPyObject<'_, 'py> for CameraLike {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(camera) = value.cast::<Camera>() {
+            return Ok(Self::Camera(camera.get().clone()));
+        }
+        if let Ok(number) = value.extract() {
+            return Ok(Self::Number(number));
+        }
+        if let Ok(name) = value.extract() {
+            return Ok(Self::Name(name));
+        }
+        Err(PyTypeError::new_err(format!(
+            "{} is no camera; give a Camera, or the name or number of one of the scene's",
+            value.repr()?
+        )))
+    }
 }
 
 /// A built scene, and the parts of its description that it lacks.
@@ -373,7 +449,7 @@ impl Scene {
         let (camera, cameras) = (description.camera, description.cameras.clone());
         let offset = description.offset;
         let environment = description.environment.clone();
-        let built = parallel(py, move || scene::Scene::new(description))?;
+        let built = abandonable(py, move || scene::Scene::new(description))?;
         let scene = built.map_err(|error| bad_value(format!("{name}: {error}")))?;
         let data =
             SceneData { scene, name, camera, cameras, subject, offset, environment, up, lobes };

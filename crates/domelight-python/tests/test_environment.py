@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import signal
 import warnings
 
 import numpy as np
@@ -138,3 +139,39 @@ def test_densities_of_ones_own(env, rng):
         dl.Density(env, weights)
     with pytest.raises(ValueError, match="all weights are 0"):
         dl.Density(env, np.zeros(env.shape))
+
+
+def test_densities_are_pickled_and_compared(env):
+    weights = np.linspace(0, 1, env.map[..., 0].size).reshape(env.shape)
+    density = dl.Density(env, weights)
+    wi = np.array([[0, 1, 0], [0.6, 0, 0.8]])
+    for other in (pickle.loads(pickle.dumps(density)), copy.deepcopy(density), dl.Density(env, weights)):
+        assert other == density and hash(other) == hash(density)
+        assert np.array_equal(other.pdf(wi), density.pdf(wi))
+    assert density != dl.Density(env, weights + 1) and density != dl.Density(env.scaled(2), weights)
+
+
+def test_a_notebook_shows_the_map():
+    for rows, size in [(4, (8, 4)), (600, (400, 200))]:
+        png = dl.Environment.builtin("studio", rows=rows)._repr_png_()
+        assert png.startswith(b"\x89PNG")
+        assert tuple(int.from_bytes(png[i : i + 4], "big") for i in (16, 20)) == size
+
+
+def test_a_signal_ends_the_wait_for_a_map():
+    """The handler's exception comes at once, not when the map is complete."""
+    class Stopped(Exception):
+        pass
+
+    def stop(*_):
+        raise Stopped
+
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        with pytest.raises(Stopped):
+            while True:
+                dl.Environment.builtin("cathedral", rows=1024)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)

@@ -165,8 +165,8 @@ def test_the_line_of_a_scene_file_that_names_a_missing_map_is_named(tmp_path):
 
 
 def test_messages_name_the_argument(env):
-    def refused(match, function, *args, **kwargs):
-        with pytest.raises(ValueError, match=match):
+    def refused(match, function, *args, error=ValueError, **kwargs):
+        with pytest.raises(error, match=match):
             function(*args, **kwargs)
 
     for render in (dl.render, dl.progressive):
@@ -176,9 +176,24 @@ def test_messages_name_the_argument(env):
         refused(r"spp is -1; it must be a whole number from 1 to 16777216", render, SPHERE, env, spp=-1)
         refused(r"spp is 2.5", render, SPHERE, env, spp=2.5)
         refused(r"seed is -3", render, SPHERE, env, seed=-3)
+        refused(r"argument 'camera': 1.5 is no camera; give a Camera", render, SPHERE, env, camera=1.5, error=TypeError)
     refused(r"strategies is 'mis'; it must be a list, such as \['mis'\]", dl.compare, SPHERE, env, "mis")
     refused(r"seeds is 0", dl.compare, SPHERE, env, ["mis"], seeds=0)
     refused(r"reference_spp is -2", dl.compare, SPHERE, env, ["mis"], reference_spp=-2)
     refused(r"pixel is 3; it must be \(column, row\)", dl.inspect, SPHERE, env, pixel=3)
     refused(r"strategies is 'mis'", dl.inspect, SPHERE, env, pixel=(1, 1), strategies="mis")
+    refused(r"5 is no material; give a text such as 'diffuse:0.5'", dl.Material, 5, error=TypeError)
     refused(r"n_rays is 0; it must be a whole number", dl.strategy, n_rays=0)
+
+
+def test_warnings_point_at_the_caller(tmp_path):
+    path = tmp_path / "negative.pfm"
+    path.write_bytes(b"PF\n2 1\n-1.0\n" + np.array([1, 1, 1, -1, 1, 1], "<f4").tobytes())
+    with pytest.warns(dl.DomelightWarning, match="repaired") as caught:
+        dl.Environment.load(path)
+    assert {warning.filename for warning in caught} == {__file__}
+    few = dict(budget="spp:1", seeds=1, reference_spp=1, size=(4, 4))
+    with pytest.warns(dl.DomelightWarning) as caught:
+        dl.compare(SPHERE, ENV, {"none": lambda points: ([], np.empty((0, 3)), [])}, **few | {"budget": "rays:1"})
+    assert {warning.filename for warning in caught} == {__file__}
+    assert any("too few for a budget of rays" in str(warning.message) for warning in caught)

@@ -1,5 +1,6 @@
 """Renders: films, interruption, progress, threads, processes."""
 
+import copy
 import importlib.util
 import multiprocessing
 import os
@@ -471,3 +472,21 @@ def test_import_is_quick():
     script = "import time, numpy, numpy.typing; t = time.perf_counter(); import domelight; print(time.perf_counter() - t)"
     run = lambda: float(subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout)
     assert min(run() for _ in range(5)) < 0.03
+
+
+def test_cameras_are_pickled_and_compared():
+    full = dict(origin=(1, 2, 3), target=(0, 0.1, 0), up=(0, 0, 1), fov=33.3, shift=(0.1, -0.2), aperture=0.1,
+                focus_distance=2.5, blades=6)
+    for settings in ({}, {"ortho": 2.5}, full):
+        camera = dl.Camera(**settings)
+        for other in (pickle.loads(pickle.dumps(camera)), copy.deepcopy(camera), dl.Camera(**settings)):
+            assert other == camera and hash(other) == hash(camera) and repr(other) == repr(camera)
+        assert camera != dl.Camera(**{**settings, "shift": (0.5, 0)})
+
+
+def test_films_say_how_many_samples_they_have(sphere, env):
+    even = dl.render(sphere, env, "mis", spp=2, size=(8, 8))
+    assert repr(even) == "<Film 8 x 8: mis, 2 samples>", repr(even)
+    film = dl.render(sphere, env, "mis", spp=1 << 20, size=(8, 8), time=0.05)
+    assert not film.complete
+    assert f"{film['samples'].mean():.1f}".removesuffix(".0") + " of 1048576 samples, not complete" in repr(film)
