@@ -524,13 +524,12 @@ fn densities<'py>(
 /// Notes
 /// -----
 /// If a weight is 0 but the radiance is not, this density alone is biased; combine it with another density.
+/// Densities can be pickled, and they are equal if maps, orientations and weights are.
 ///
 /// Raises
 /// ------
 /// ValueError
 ///     If the shape is not that of the map, or a weight is negative or not finite; the message names it.
-///
-/// Densities can be pickled and compared: they are equal if maps, orientations and weights are.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Density {
     environment: Arc<environment::Environment>,

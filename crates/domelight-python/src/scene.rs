@@ -27,7 +27,8 @@ use crate::environment::{Environment, builtin_map, load_map, up_axis, up_name};
 use crate::error::{bad_value, from_source, to_python, warn};
 use crate::lobe::PythonLobe;
 
-/// A camera. Omitted parts come from the scene's own camera, or from one that frames the scene.
+/// A camera. Omitted parts come from the scene's own camera, or from one that frames the scene. Cameras can be pickled and
+/// compared.
 ///
 /// Parameters
 /// ----------
@@ -50,8 +51,6 @@ use crate::lobe::PythonLobe;
 ///     Distance along the axis at which the lens is sharp, positive; required with `aperture`.
 /// blades : int, default 0
 ///     Number of aperture blades; fewer than 3 mean a round aperture.
-///
-/// Cameras can be pickled and compared.
 #[pyclass(frozen, from_py_object, module = "domelight")]
 #[derive(Clone, PartialEq)]
 pub(crate) struct Camera {
