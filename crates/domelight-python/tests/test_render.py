@@ -486,7 +486,7 @@ def test_cameras_are_pickled_and_compared():
 
 def test_films_say_how_many_samples_they_have(sphere, env):
     even = dl.render(sphere, env, "mis", spp=2, size=(8, 8))
-    assert repr(even) == "<Film 8 x 8: mis, 2 samples>", repr(even)
+    assert repr(even) == "<Film 8 x 8: mis:1:1, 2 samples>", repr(even)
     film = dl.render(sphere, env, "mis", spp=1 << 20, size=(8, 8), time=0.05)
     assert not film.complete
     assert f"{film['samples'].mean():.1f}".removesuffix(".0") + " of 1048576 samples, not complete" in repr(film)
