@@ -536,7 +536,7 @@ pub(crate) struct Density {
     /// The name of the environment.
     name: String,
     weights: Vec<f32>,
-    density: EnvironmentDensity,
+    inner: EnvironmentDensity,
 }
 
 #[pymethods]
@@ -552,9 +552,9 @@ impl Density {
             return Err(weights.bad_shape(&expected));
         }
         let weights = weights.values()?.to_vec();
-        let density = parallel(py, || EnvironmentDensity::new(environment, weights.clone()))?;
-        let density = density.map_err(|e| from_source(&e))?;
-        Ok(Self { environment: environment.clone(), name: name.clone(), weights, density })
+        let inner = parallel(py, || EnvironmentDensity::new(environment, weights.clone()))?;
+        let inner = inner.map_err(|e| from_source(&e))?;
+        Ok(Self { environment: environment.clone(), name: name.clone(), weights, inner })
     }
 
     /// Sample directions from the density.
@@ -569,7 +569,7 @@ impl Density {
     /// wi, radiance, pdf
     ///     As in `Environment.sample`.
     fn sample<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Samples<'py>> {
-        let draw = |u: [f32; 2]| self.density.sample(&self.environment, u.into());
+        let draw = |u: [f32; 2]| self.inner.sample(&self.environment, u.into());
         samples(&self.environment, u, draw)
     }
 
@@ -585,7 +585,7 @@ impl Density {
     /// ndarray, shape (...)
     ///     Density [sr^-1].
     fn pdf<'py>(&self, wi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        densities(wi, |w| self.density.pdf(&self.environment, w.into()))
+        densities(wi, |w| self.inner.pdf(&self.environment, w.into()))
     }
 
     fn __repr__(&self) -> String {
