@@ -82,7 +82,9 @@ pub(crate) fn abandonable<T: Send + 'static>(
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(PyRuntimeError::new_err("the computation has ended with an error"));
                 }
-                Err(RecvTimeoutError::Timeout) => Python::attach(|py: Python<'_>| py.check_signals())?,
+                Err(RecvTimeoutError::Timeout) => {
+                    Python::attach(|py: Python<'_>| py.check_signals())?
+                }
             }
         }
     })
