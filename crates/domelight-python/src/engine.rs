@@ -83,7 +83,7 @@ pub(crate) fn abandonable<T: Send + 'static>(
                     return Err(PyRuntimeError::new_err("the computation has ended with an error"));
                 }
                 Err(RecvTimeoutError::Timeout) => {
-                    Python::attach(|py: Python<'_>| py.check_signals())?
+                    Python::attach(|py: Python<'_>| py.check_signals())?;
                 }
             }
         }
