@@ -65,6 +65,7 @@ export class App {
       void this.provide().then(() => this.load());
     };
     addEventListener("hashchange", () => {
+      this.address = location.hash;
       if (location.hash.replace(/^#/, "") === toHash(this.state)) return;
       this.state = this.fromAddress();
       this.history.note(this.state);
@@ -73,6 +74,9 @@ export class App {
       this.load();
     });
   }
+
+  /** The part of the address that the state was read from or written to. */
+  private address = location.hash;
 
   /** The state in the address; what is wrong there is said. */
   private fromAddress(): State {
@@ -156,15 +160,22 @@ export class App {
     $("wrong").hidden = true;
     // The browser's Back leads to the last panel or step.
     const hash = `#${toHash(this.state)}`;
-    if (("panel" in change || "step" in change) && hash !== location.hash) history.pushState(null, "", hash);
-    else this.keepInAddress();
+    if (("panel" in change || "step" in change) && hash !== location.hash) {
+      history.pushState(null, "", hash);
+      this.address = location.hash;
+    } else this.keepInAddress();
     if (["scene", "material", "ground", "env", "rows", "rotate", "ev", "scale"].some((key) => key in change)) this.load();
     else this.emit(what);
   }
 
   private keepInAddress() {
     clearTimeout(this.hashTimer);
-    this.hashTimer = setTimeout(() => history.replaceState(null, "", `#${toHash(this.state)}`), 200) as unknown as number;
+    this.hashTimer = setTimeout(() => {
+      // An address that somebody has changed meanwhile is about to be read.
+      if (location.hash !== this.address) return;
+      history.replaceState(null, "", `#${toHash(this.state)}`);
+      this.address = location.hash;
+    }, 200) as unknown as number;
   }
 
   /** The files named by the state that have not been dropped yet. */
