@@ -1039,11 +1039,13 @@ test("terms are explained under the pointer and at the keyboard's focus", async 
   const { page, done } = await open(`${SMALL}&scene=sphere&strategy=brdf:2`);
   await rendered(page);
   const meaning = page.locator("#meaning");
-  // The caption is written anew while the reference grows.
-  await page.waitForFunction(() => { const { reference } = window.domelight.picture; return reference.isReady && !reference.running; });
-  await page.waitForTimeout(300);
   await page.waitForFunction(() => /brdf:2/.test(document.querySelector("#picture figcaption .term:last-of-type, #picture figcaption").textContent));
-  await page.locator("#picture figcaption .term", { hasText: "brdf:2" }).hover();
+  // The caption is written anew while the reference grows, which takes the word from under the pointer.
+  do {
+    await page.mouse.move(2, 2);
+    await page.locator("#picture figcaption .term", { hasText: "brdf:2" }).hover();
+    await page.waitForTimeout(50);
+  } while (await meaning.isHidden());
   assert.match(await meaning.textContent(), /in proportion to the BRDF/);
   // The pointer may move onto the meaning, but not away.
   await meaning.hover();
