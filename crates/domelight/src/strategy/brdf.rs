@@ -1,10 +1,7 @@
 //! BRDF sampling: directions in proportion to reflectance, regardless of the light.
 
-use super::multi_sample::{Count, MultiSample, SampleScratch};
-use super::{Contributions, PointStrategy, SampleIndex, ShadingPoint, TileShading};
-use crate::Rgb;
+use super::multi_sample::{Count, MultiSample, point_strategy_of_samples};
 use crate::environment::Environment;
-use crate::math::Vec3;
 use crate::sampling::Heuristic;
 
 /// (1/N) Σ f_r cos θ · L / p_brdf: best for narrow lobes under wide light.
@@ -28,35 +25,4 @@ impl BrdfSampling<'_> {
     }
 }
 
-impl PointStrategy for BrdfSampling<'_> {
-    type Scratch = SampleScratch;
-
-    const UNBIASED: bool = true;
-
-    fn unit(&self) -> f64 {
-        self.environment.unit()
-    }
-
-    fn n_rays(&self) -> u32 {
-        self.n_samples
-    }
-
-    fn sample(
-        &self,
-        at: &ShadingPoint,
-        sample_index: SampleIndex,
-        _: &mut SampleScratch,
-        push: impl FnMut(Vec3, Rgb),
-    ) {
-        self.samples().sample(at, sample_index, push);
-    }
-
-    fn sample_tile(
-        &self,
-        tile: &TileShading,
-        scratch: &mut SampleScratch,
-        out: &mut Contributions,
-    ) {
-        self.samples().sample_tile(tile, scratch, out);
-    }
-}
+point_strategy_of_samples!(BrdfSampling);

@@ -1,11 +1,8 @@
 //! Sampling both the environment and the BRDF, combined by multiple importance sampling: Veach &
 //! Guibas 1995, equation 10 (the multi-sample model; the weights sum to one for each direction).
 
-use super::multi_sample::{Count, MultiSample, SampleScratch};
-use super::{Contributions, PointStrategy, SampleIndex, ShadingPoint, TileShading};
-use crate::Rgb;
+use super::multi_sample::{Count, MultiSample, point_strategy_of_samples};
 use crate::environment::{CompensatedTable, Environment};
-use crate::math::Vec3;
 use crate::sampling::Heuristic;
 
 /// The density from which directions toward the light are sampled.
@@ -67,35 +64,4 @@ impl<'a> MultipleImportanceSampling<'a> {
     }
 }
 
-impl PointStrategy for MultipleImportanceSampling<'_> {
-    type Scratch = SampleScratch;
-
-    const UNBIASED: bool = true;
-
-    fn unit(&self) -> f64 {
-        self.environment.unit()
-    }
-
-    fn n_rays(&self) -> u32 {
-        self.n_environment + self.n_brdf
-    }
-
-    fn sample(
-        &self,
-        at: &ShadingPoint,
-        sample_index: SampleIndex,
-        _: &mut SampleScratch,
-        push: impl FnMut(Vec3, Rgb),
-    ) {
-        self.samples().sample(at, sample_index, push);
-    }
-
-    fn sample_tile(
-        &self,
-        tile: &TileShading,
-        scratch: &mut SampleScratch,
-        out: &mut Contributions,
-    ) {
-        self.samples().sample_tile(tile, scratch, out);
-    }
-}
+point_strategy_of_samples!(MultipleImportanceSampling);

@@ -43,6 +43,46 @@ pub(super) struct MultiSample<'a> {
     pub(super) heuristic: Heuristic,
 }
 
+/// Implements [`PointStrategy`](super::PointStrategy) for a strategy whose `samples` are a [`MultiSample`].
+macro_rules! point_strategy_of_samples {
+    ($strategy:ident) => {
+        impl $crate::strategy::PointStrategy for $strategy<'_> {
+            type Scratch = $crate::strategy::SampleScratch;
+
+            const UNBIASED: bool = true;
+
+            fn unit(&self) -> f64 {
+                self.environment.unit()
+            }
+
+            fn n_rays(&self) -> u32 {
+                let samples = self.samples();
+                samples.n_light.n + samples.n_brdf.n
+            }
+
+            fn sample(
+                &self,
+                at: &$crate::strategy::ShadingPoint,
+                sample_index: $crate::strategy::SampleIndex,
+                _: &mut Self::Scratch,
+                push: impl FnMut($crate::math::Vec3, $crate::Rgb),
+            ) {
+                self.samples().sample(at, sample_index, push);
+            }
+
+            fn sample_tile(
+                &self,
+                tile: &$crate::strategy::TileShading,
+                scratch: &mut Self::Scratch,
+                out: &mut $crate::strategy::Contributions,
+            ) {
+                self.samples().sample_tile(tile, scratch, out);
+            }
+        }
+    };
+}
+pub(super) use point_strategy_of_samples;
+
 /// A way to draw directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Technique {
