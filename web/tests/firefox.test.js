@@ -147,7 +147,7 @@ test("the main figures of the lecture play, pause, are dragged and read", { skip
     await page.waitForFunction((first) => document.querySelector("#figure .player").previousElementSibling.querySelector("input").value !== first, {}, first);
     if (await toggle.evaluate((button) => button.textContent) === "Pause") await toggle.click();
     const paused = await player();
-    await new Promise((done) => setTimeout(done, 400));
+    await new Promise((done) => setTimeout(done, 200));
     assert.equal(await player(), paused, "a paused figure stands still");
     await settled(page);
     // The pointer reads values, and drags.

@@ -6,8 +6,8 @@ import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { SMALL, address, brightness, canvasHash, close, launch, open, rendered, renderedAnew, show, slide, text } from "./page.js";
 
-/** The lecture under the usual light; its figures need no scene, so this one is loaded quickest. */
-const LECTURE = `${SMALL}&scene=sphere&panel=lecture`;
+/** The lecture under the usual light; its figures need no scene, so this one is loaded quickest, and render small pictures. */
+const LECTURE = "size=32&spp=4&rows=64&scene=sphere&panel=lecture";
 
 before(launch);
 after(close);
@@ -106,7 +106,7 @@ test("two strategies at equal rays, with a divider", async () => {
 });
 
 test("errors are measured at whole passes against a reference that is made by itself and kept", async () => {
-  const { page, done } = await open("size=64&spp=16&rows=64&env=studio&strategy=mis:1:1");
+  const { page, done } = await open("size=32&spp=16&rows=64&env=studio&strategy=mis:1:1");
   const measured = () => page.waitForSelector("figure[data-error=measured]");
   await rendered(page);
   await measured();
@@ -131,7 +131,7 @@ test("errors are measured at whole passes against a reference that is made by it
   await renderedAnew(page, () => page.evaluate(() => window.domelight.app.set({ strategy: "brdf:2" })));
   await measured();
   assert.equal((await read()).renders >= first.renders, true);
-  const again = await open("size=64&spp=16&rows=64&env=studio&strategy=mis:1:1");
+  const again = await open("size=32&spp=16&rows=64&env=studio&strategy=mis:1:1");
   await rendered(again.page);
   await again.page.waitForFunction(() => { const { reference } = window.domelight.picture; return reference.isReady && !reference.running; });
   await again.page.waitForTimeout(300);
@@ -143,7 +143,7 @@ test("errors are measured at whole passes against a reference that is made by it
 test("a biased strategy is measured with its bias, which its variance does not show", async () => {
   // Four lights cannot stand for the many windows of a nave: the bias is fifty times the variance, which is that of the
   // camera's samples alone. Under the sky, sixteen lights have as much of the one as of the other.
-  const { page, done } = await open("size=64&spp=16&rows=64&env=cathedral&strategy=median-cut:4");
+  const { page, done } = await open("size=32&spp=16&rows=64&env=cathedral&strategy=median-cut:4");
   await rendered(page);
   await page.waitForSelector("figure[data-error=measured]");
   await page.waitForFunction(() => { const { reference } = window.domelight.picture; return reference.isReady && !reference.running; });
@@ -156,7 +156,7 @@ test("a biased strategy is measured with its bias, which its variance does not s
 });
 
 test("without a reference the error is called an estimate", async () => {
-  const { page, done } = await open("size=64&spp=16&rows=64&strategy=mis:1:1&camera=null");
+  const { page, done } = await open("size=32&spp=16&rows=64&strategy=mis:1:1&camera=null");
   await page.evaluate(() => { window.domelight.app.reference = () => Promise.reject(new Error("no memory")); });
   await renderedAnew(page, () => page.evaluate(() => window.domelight.app.set({ rotate: 10 })));
   await page.waitForFunction(() => /no memory/.test(document.querySelector("#picture figcaption").textContent));
@@ -184,7 +184,7 @@ test("the plot of the error pairs each estimate with the rays that it is of", as
 });
 
 test("the error view measures the picture against a reference", async () => {
-  const { page, done } = await open("size=64&spp=32&rows=64&env=studio&strategy=mis:1:1&beside=product:8&view=error");
+  const { page, done } = await open("size=32&spp=32&rows=64&env=studio&strategy=mis:1:1&beside=product:8&view=error");
   await rendered(page);
   await page.waitForFunction(() => /The reference has \d+ samples/.test(document.getElementById("error-legend").textContent));
   await page.waitForFunction(() => window.domelight.picture.reference.renders >= 8 || !window.domelight.picture.reference.running);
@@ -203,7 +203,7 @@ test("the error view measures the picture against a reference", async () => {
 test("without WebGL2 the error view is the same", async () => {
   const seen = [];
   for (const query of ["", "?2d"]) {
-    const { page, done } = await open("size=64&spp=1&rows=64&env=studio&strategy=brdf:1&view=error", { query });
+    const { page, done } = await open("size=32&spp=1&rows=64&env=studio&strategy=brdf:1&view=error", { query });
     await page.waitForFunction(() => { const { reference } = window.domelight.picture; return reference.isReady && !reference.running; });
     await page.evaluate(() => window.domelight.picture.reference.stop());
     await page.waitForTimeout(300);
@@ -356,7 +356,8 @@ for (const method of ["median-cut", "variance-minimization"]) {
     await page.waitForSelector(`html[data-rig='${method}:6']`);
     await page.click("#play-lights");
     const n = await page.inputValue("#n-lights");
-    await page.waitForTimeout(1000);
+    // Longer than a step of playback takes.
+    await page.waitForTimeout(800);
     assert.equal(await page.inputValue("#n-lights"), n, "it stays where it was stopped");
     await done();
   });
@@ -447,6 +448,13 @@ const figureOf = (page) => page.$eval("#figure", (figure) => {
   return JSON.stringify([[...figure.querySelectorAll("svg")].map((svg) => svg.innerHTML), canvases, figure.querySelector(".result").textContent]);
 });
 
+/** Shows a step of the lecture, and waits for its figure. One repeat of the four ways at their counts takes least. */
+async function showStep(page, step) {
+  await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=${step}${step === 12 ? "&figure=counts;0;1" : ""}`);
+  await page.waitForSelector(`html[data-step='${step}']`);
+  await drawn(page, 1);
+}
+
 /** Waits until the lecture's figure shows what its controls say. */
 const settled = (page) => page.waitForSelector("#figure:not([data-drawing])");
 
@@ -455,12 +463,10 @@ const drawn = (page, n) => page.waitForFunction((n) => Number(document.getElemen
 
 test("every step of the lecture has a figure that each of its controls changes", async () => {
   const { page, done } = await open(`${LECTURE}`);
-  page.setDefaultTimeout(180_000);
   const steps = await page.$$eval("#steps a", (all) => all.length);
   assert.equal(steps, 15);
   for (let step = 1; step <= steps; step++) {
-    await page.click(`#steps li:nth-child(${step}) a`);
-    await drawn(page, 1);
+    await showStep(page, step);
     assert.ok(await page.$("#step math"), `step ${step} has a formula`);
     assert.ok((await text(page, "#step .question")).length > 40);
     assert.match(await text(page, "#figure .result"), /\d/, `step ${step} says a number`);
@@ -540,10 +546,7 @@ const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[
 test("the figure of every step plays, pauses, is dragged and read", async (t) => {
   const { page, done } = await open(LECTURE);
   for (let step = 1; step <= 15; step++) await t.test(`step ${step}`, async () => {
-    // One repeat of the four ways at equal time takes least.
-    await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=${step}${step === 12 ? "&figure=time;0;1" : ""}`);
-    await page.waitForSelector(`html[data-step='${step}']`);
-    await drawn(page, 1);
+    await showStep(page, step);
     // From its last step, a figure would start over.
     await page.$eval("#figure .player", (player) => {
       const input = player.previousElementSibling.querySelector("input");
@@ -565,7 +568,8 @@ test("the figure of every step plays, pauses, is dragged and read", async (t) =>
     assert.ok(wasPlaying);
     const position = () => page.$eval("#figure .player", (player) => player.previousElementSibling.querySelector("input").value);
     const paused = await position();
-    await page.waitForTimeout(350);
+    // Longer than a step of playback takes.
+    await page.waitForTimeout(200);
     assert.equal(await position(), paused, "a paused figure stands still");
     assert.notEqual(await figureOf(page), before, "it plays");
     const framed = page.locator("#figure [data-frame]").first();
@@ -627,7 +631,6 @@ for (const step of [14, 15]) {
 
 test("the answer of step 12 is what its figure shows, with the repeats' standard errors", async () => {
   const { page, done } = await open(`${LECTURE}&step=12&figure=counts;0;2`);
-  page.setDefaultTimeout(180_000);
   await drawn(page, 1);
   const captions = await page.$$eval("#figure figcaption", (all) => all.map((caption) => caption.textContent));
   for (const caption of captions) assert.match(caption, /error [\d.·⁻⁰-⁹10]+ ± .* s$/);
@@ -746,9 +749,10 @@ test("on paper the answers are open and the page is light", async () => {
 });
 
 test("the picture stays in sight while its controls are used", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
   for (const [width, height] of [[1280, 800], [1366, 768], [390, 844]]) {
-    const { page, done } = await open(SMALL, { viewport: { width, height } });
-    await rendered(page);
+    await page.setViewportSize({ width, height });
     for (const control of ["#scene", "#spp", "#seed", "#copy-command"]) {
       await page.focus(control);
       await page.locator(control).scrollIntoViewIfNeeded();
@@ -761,8 +765,8 @@ test("the picture stays in sight while its controls are used", async () => {
       assert.ok(seen.share > 0.9, `${control} at ${width} × ${height}: ${Math.round(100 * seen.share)} % of the picture is seen`);
       assert.ok(seen.onTop, `${control} at ${width} × ${height} is not covered`);
     }
-    await done();
   }
+  await done();
 });
 
 test("sliders say their values as they are written", async () => {
@@ -778,7 +782,6 @@ test("sliders say their values as they are written", async () => {
 
 test("all steps are printed, with and without answers", async () => {
   const { page, done } = await open(`${LECTURE}`, { script: "window.print = () => { window.printed = true; };" });
-  page.setDefaultTimeout(180_000);
   for (const answers of [true, false]) {
     await page.setChecked("#with-answers", answers);
     await page.click("#print-all");
@@ -1004,10 +1007,7 @@ test("each step shows its situation in other panels, and one comes back to its f
   const { page, done } = await open(LECTURE);
   const back = page.locator("#back");
   for (let step = 1; step <= await page.$$eval("#steps li", (all) => all.length); step++) {
-    // One repeat of the four ways at equal time takes least.
-    await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=${step}${step === 12 ? "&figure=time;0;1" : ""}`);
-    await page.waitForSelector(`html[data-step='${step}']`);
-    await drawn(page, 1);
+    await showStep(page, step);
     const n = await page.locator("#step .opens button").count();
     assert.ok(n > 0, `step ${step} is seen somewhere else`);
     for (let k = 0; k < n; k++) {
@@ -1132,17 +1132,26 @@ test("zooming ends far outside and close to the scene", async () => {
   await done();
 });
 
-for (const [colorScheme, width] of ["light", "dark"].flatMap((scheme) => [390, 820, 1440].map((width) => [scheme, width]))) {
-  test(`every panel fits ${width} pixels and has no violations of accessibility, ${colorScheme}`, async () => {
-    const { page, done } = await open(`${SMALL}&pixel=[27,27]&scene=statue`, { viewport: { width, height: 844 }, colorScheme });
-    await rendered(page);
-    for (const panel of ["picture", "map", "xray", "lights", "lecture"]) {
-      await show(page, panel);
-      await page.waitForTimeout(300);
+test("every panel fits 390, 820 and 1440 pixels and has no violations of accessibility, light and dark", async () => {
+  const { page, done } = await open(`${SMALL}&pixel=[27,27]&scene=statue`);
+  await rendered(page);
+  const seen = { map: "[data-map][data-samples]", xray: "[data-xray]", lights: "[data-rig]", lecture: "[data-step]" };
+  for (const panel of ["picture", "map", "xray", "lights", "lecture"]) {
+    await show(page, panel);
+    if (seen[panel]) await page.waitForSelector(`html${seen[panel]}`);
+    if (panel === "lecture") await drawn(page, 1);
+    for (const width of [390, 820, 1440]) {
+      await page.setViewportSize({ width, height: 844 });
+      // Figures follow the window a tenth of a second later.
+      await page.waitForTimeout(150);
+      if (panel === "lecture") await settled(page);
       const [wide, seen] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
       assert.ok(wide <= seen, `${panel}: ${wide} px in ${seen}`);
-      assert.deepEqual(await violations(page), [], panel);
+      for (const colorScheme of ["light", "dark"]) {
+        await page.emulateMedia({ colorScheme });
+        assert.deepEqual(await violations(page), [], `${panel}, ${colorScheme}, ${width} pixels`);
+      }
     }
-    await done();
-  });
-}
+  }
+  await done();
+});

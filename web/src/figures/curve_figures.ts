@@ -49,9 +49,9 @@ export const combination = (stage: Stage) => {
     };
     const exact = integral(f, 8000);
     const errors = { "light alone": variance(q, () => 1) / 16, "lobe alone": variance(lobe, () => 1) / 16, both: variance(q, w) / m + variance(lobe, (x) => 1 - w(x)) / n };
-    const at = pointed()?.x;
+    const at = pointed()?.x, [mostLight, mostLobe] = [top(q), top(lobe)];
     stage.svg(plot([
-      { name: "light", kind: "light", points: line(400, (x) => q(x) / top(q)) }, { name: "lobe", kind: "lobe", points: line(400, (x) => lobe(x) / top(lobe)) },
+      { name: "light", kind: "light", points: line(400, (x) => q(x) / mostLight) }, { name: "lobe", kind: "lobe", points: line(400, (x) => lobe(x) / mostLobe) },
       { name: "MIS weight of light samples", kind: "product", points: line(400, w), as: "area" }, marker(at, 1.05),
     ], { x: { name: "direction, drag the lobe’s flank", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] }, presented: 480 }), "Two densities and the MIS weight of one of them");
     stage.read(at === undefined ? null : `Direction ${at.toFixed(2)}: light’s density ${short(q(at))}, lobe’s ${short(lobe(at))}, weight of a light sample ${w(at).toFixed(2)}, of a lobe sample ${(1 - w(at)).toFixed(2)}. ∫ p = ${integral(q, 8000).toFixed(2)} each.`);
@@ -82,10 +82,10 @@ export const product = (stage: Stage) => {
       return Math.sqrt(Math.max(second - exact ** 2, 0)) / total;
     };
     const deviations: [string, number][] = [["light", deviation(q)], ["lobe", deviation(r)], ["product", Math.sqrt(visible * (visible < 1 - 1e-9 ? 1 - visible : 0))]];
-    const at = pointed()?.x;
+    const at = pointed()?.x, [mostLight, mostProduct] = [top(light), top(p)];
     stage.svg(plot([
-      { name: "light", kind: "light", points: line(400, (x) => light(x) / top(light)) }, { name: "lobe", kind: "lobe", points: line(400, lobe) },
-      { name: "product", kind: "product", points: line(400, (x) => p(x) / top(p)), as: "area" },
+      { name: "light", kind: "light", points: line(400, (x) => light(x) / mostLight) }, { name: "lobe", kind: "lobe", points: line(400, lobe) },
+      { name: "product", kind: "product", points: line(400, (x) => p(x) / mostProduct), as: "area" },
       { name: "occluded", kind: "visibility", points: [[hidden(), 0], [1, 0]], as: "band" }, marker(at, 1.05),
     ], { x: { name: "direction, drag the lobe or the shadow’s edge", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] }, presented: 480 }), "Light, lobe and their product");
     stage.read(at === undefined ? null : `Direction ${at.toFixed(2)}: L = ${short(light(at))}, f · cos θ = ${short(lobe(at))}, V = ${at < hidden() ? 1 : 0}; densities: light ${short(q(at))}, lobe ${short(r(at))}, product ${short(p(at))}. ∫ p = ${integral(p, 4000).toFixed(2)}.`);

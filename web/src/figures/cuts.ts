@@ -115,7 +115,8 @@ class Spheres {
     });
   }
 }
-const SPHERE = 160;
+/** Pixels along an edge of a sphere's picture, which is drawn twice as large: matte shading is smooth, and the rim is cut. */
+const SPHERE = 80;
 
 /** A method's lights of the map, shown with those of the other method. */
 export const cuts = (method: Method, other: Method) => (stage: Stage) => {
