@@ -13,6 +13,7 @@ const bundle = async (entry) => {
   return outputFiles[0].text;
 };
 const text = (name) => readFileSync(new URL(name, import.meta.url), "utf8");
+const attribute = (value) => value.replaceAll("&", "&amp;").replaceAll('"', "&quot;").replaceAll("<", "&lt;");
 const inScript = (code) => code.replaceAll("</script", "<\\/script").replaceAll("<!--", "<\\!--");
 const packed = deflateRawSync(readFileSync(wasm), { level: 9 }).toString("base64");
 const parts = {
@@ -20,10 +21,12 @@ const parts = {
   MAIN: inScript(await bundle("src/main.ts")),
   WORKER: inScript(await bundle("src/worker.ts")),
   ENGINE: packed,
-  // Where the page will be, for the links that people copy from it: BASE=https://… web/build
-  BASE: (process.env.BASE ?? "").replaceAll("&", "&amp;").replaceAll('"', "&quot;"),
+  // Where the page and its source code will be: BASE=https://… SOURCE=https://… web/build
+  BASE: attribute(process.env.BASE ?? ""),
+  SOURCE: attribute(process.env.SOURCE ?? ""),
+  VERSION: /^version = "(.*)"/m.exec(text("../Cargo.toml"))[1],
 };
-const page = text("src/index.html").replace(/@(STYLE|MAIN|WORKER|ENGINE|BASE)@/g, (_, name) => parts[name]);
+const page = text("src/index.html").replace(/@(STYLE|MAIN|WORKER|ENGINE|BASE|SOURCE|VERSION)@/g, (_, name) => parts[name]);
 mkdirSync(new URL("dist", import.meta.url), { recursive: true });
 writeFileSync(new URL("dist/domelight.html", import.meta.url), page);
 const kilobytes = (n) => `${Math.round(n / 1000)} kB`;

@@ -38,6 +38,7 @@ async function main() {
   new LightsPanel(app);
   const lecture = new Lecture(app);
   wireTabs(app);
+  wireIntro(app);
   wireHistory(app);
   wireDrop(app);
   speakValues();
@@ -74,6 +75,17 @@ function wireTabs(app: App) {
     choose(next);
     $(`tab-${next}`).focus();
   });
+}
+
+/** What a visitor without a link sees first; a model that is dropped, or another panel, takes its place. */
+function wireIntro(app: App) {
+  const isFresh = location.hash.length < 2, intro = $("intro");
+  const show = () => { intro.hidden = !isFresh || app.state.panel !== "picture" || app.files.scenes.length > 0; };
+  $("start-lecture").addEventListener("click", () => $("tab-lecture").click());
+  $("drop-model").addEventListener("click", () => $("files").click());
+  app.on(show);
+  show();
+  $("source").hidden = !$("source").querySelector("a")!.getAttribute("href");
 }
 
 /** Buttons and keys that undo and redo, and the way back to the lecture. */

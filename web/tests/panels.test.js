@@ -900,6 +900,26 @@ test("dropped files are shown, and their errors named", async () => {
   await done();
 });
 
+test("a visitor without a link is offered the lecture and a model, and reads version and license", async () => {
+  const { page, done } = await open("");
+  assert.ok(await page.isVisible("#intro"));
+  assert.match(await text(page, "footer"), /^domelight \d+\.\d+\.\d+\. License: MIT or Apache-2\.0/);
+  assert.ok(await page.isHidden("#source"), "no address of the source code was built in");
+  const [chooser] = await Promise.all([page.waitForEvent("filechooser"), page.click("#drop-model")]);
+  await chooser.setFiles({ name: "triangle.obj", mimeType: "text/plain", buffer: Buffer.from("v -1 0 0\nv 1 0 0\nv 0 1.5 0\nf 1 2 3\n") });
+  await page.waitForFunction(() => document.getElementById("scene").value === "triangle.obj");
+  assert.ok(await page.isHidden("#intro"));
+  await done();
+  const again = await open("");
+  await again.page.click("#start-lecture");
+  await again.page.waitForSelector("html[data-step='1'] #lecture:not([hidden])");
+  assert.ok(await again.page.isHidden("#intro"));
+  await again.done();
+  const linked = await open(SMALL);
+  assert.ok(await linked.page.isHidden("#intro"), "a link says what to see");
+  await linked.done();
+});
+
 test("the hash keeps the state", async () => {
   const { page, done } = await open(`${SMALL}&scene=sphere&env=cathedral&rotate=0&strategy=brdf:2&panel=lights&lights=16&method=median-cut`);
   await page.waitForSelector("html[data-rig='median-cut:16']");
