@@ -17,7 +17,7 @@ const attribute = (value) => value.replaceAll("&", "&amp;").replaceAll('"', "&qu
 const inScript = (code) => code.replaceAll("</script", "<\\/script").replaceAll("<!--", "<\\!--");
 const packed = deflateRawSync(readFileSync(wasm), { level: 9 }).toString("base64");
 const parts = {
-  STYLE: text("src/style.css"),
+  STYLE: text("src/style.css").replace("@FONT@", readFileSync(new URL("fonts/stix-two-math.woff2", import.meta.url)).toString("base64")),
   MAIN: inScript(await bundle("src/main.ts")),
   WORKER: inScript(await bundle("src/worker.ts")),
   ENGINE: packed,

@@ -34,8 +34,9 @@ const frac = (a: string, b: string) => `<mfrac>${row(a)}${row(b)}</mfrac>`;
 const sub = (a: string, b: string) => `<msub>${row(a)}${row(b)}</msub>`;
 const sup = (a: string, b: string) => `<msup>${row(a)}${row(b)}</msup>`;
 const both = (a: string, b: string, c: string) => `<msubsup>${row(a)}${row(b)}${row(c)}</msubsup>`;
+const thin = `<mspace width="0.17em"/>`;
 /** Between a function and its argument. */
-const of = `<mo>⁡</mo><mspace width="0.17em"/>`;
+const of = `<mo>⁡</mo>${thin}`;
 const sum = (a: string, b: string) => `<munderover>${o("∑")}${row(a)}${row(b)}</munderover>`;
 const int = (a: string) => `<msub>${o("∫")}${row(a)}</msub>`;
 /** Parentheses that grow with what they hold. */
@@ -46,9 +47,9 @@ const at = (j: string) => par(sub(i("ω"), row(i("i"), o(","), j)));
 const space = `<mspace width="0.6em"/>`;
 /** A term that cancels against another. */
 const canceled = (...x: string[]) => `<mrow class="canceled">${x.join("")}</mrow>`;
-const eq = o("="), d = `<mspace width="0.17em"/><mi mathvariant="normal">d</mi>`;
+const eq = o("="), d = `${thin}<mi mathvariant="normal">d</mi>`;
 const wi = sub(i("ω"), i("i")), wo = sub(i("ω"), i("o")), wh = sub(i("ω"), i("h"));
-const fr = ofKind("lobe", sub(i("f"), i("r"))), cos = (x: string) => ofKind("lobe", i("cos"), of, sub(i("θ"), x));
+const fr = ofKind("lobe", sub(i("f"), i("r"))), cos = (x: string) => ofKind("lobe", thin, i("cos"), of, sub(i("θ"), x));
 const Li = ofKind("light", sub(i("L"), i("i"))), V = ofKind("visibility", i("V")), qLight = ofKind("light", sub(i("q"), i("m"))), qLobe = ofKind("lobe", sub(i("q"), i("n")));
 const phat = `<mover>${i("p")}${o("^")}</mover>`;
 const Lns = sub(i("L"), i("ns"));
@@ -134,7 +135,7 @@ export const STEPS: Step[] = [
       row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(fr, cos(row(i("i"), o(","), i("j"))), Li, at(i("j")), V, at(i("j"))), row(i("q"), at(i("j"))))),
       row(ofKind("light", sub(i("q"), i("L"))), par(wi), eq, frac(row(Li, par(wi)), row(int(i("Ω")), Li, d, wi))),
       row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(row(int(i("Ω")), Li, d, wi), i("N")), sumN, fr, cos(row(i("i"), o(","), i("j"))), V, at(i("j"))),
-      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(sup(tall(int(i("Ω")), Li, d, wi), n(2)), i("N")), i("Var"), of, par(fr, cos(i("i")), V)),
+      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(sup(tall(int(i("Ω")), Li, d, wi), n(2)), i("N")), thin, i("Var"), of, par(fr, cos(i("i")), V)),
     ],
     question: "How many of the samples hit the brightest hundredth of the map?",
     answer: "About the same share as its share of the total light, which the figure states; under a sky with a sun, most samples.",
@@ -160,7 +161,7 @@ export const STEPS: Step[] = [
     formulas: [
       row(ofKind("product", i("p"), par(wi)), eq, frac(row(fr, cos(i("i")), Li), Lns)), row(Lns, eq, int(i("Ω")), fr, cos(i("i")), Li, d, wi),
       row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(canceled(fr, cos(i("i")), Li), V, at(i("j"))), row(canceled(fr, cos(i("i")), Li), o("/"), Lns))), row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(Lns, i("N")), sumN, V, at(i("j"))),
-      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), i("Var"), of, par(V)),
+      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), thin, i("Var"), of, par(V)),
     ],
     question: "When does the product resemble neither of its factors?",
     answer: "When light and lobe overlap only in their tails. Then both densities waste nearly all samples, and the product has a peak that neither factor has.",

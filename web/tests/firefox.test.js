@@ -130,6 +130,12 @@ const DRAGS = [
 
 test("the main figures of the lecture play, pause, are dragged and read", { skip }, async (t) => {
   const { page, done } = await open("size=64&spp=4&rows=64&scene=sphere&panel=lecture");
+  await settled(page);
+  const integral = await page.$$eval("#step math mo", (all) => {
+    const sign = all.find(({ textContent }) => textContent === "∫");
+    return sign.getBoundingClientRect().height / parseFloat(getComputedStyle(sign).fontSize);
+  });
+  assert.ok(integral > 2, `an integral sign is ${integral} em high`);
   for (const [step, moves, from, to] of DRAGS) await t.test(`step ${step}`, async () => {
     await page.click(`#steps li:nth-child(${step}) a`);
     await page.waitForSelector(`html[data-step='${step}']`);

@@ -661,6 +661,14 @@ test("step 9 names the density with the least variance, which is not the product
   await done();
 });
 
+test("integral signs stand at their size", async () => {
+  const { page, done } = await open(`${LECTURE}&step=1`);
+  await page.evaluate(() => document.fonts.ready);
+  const tallest = await page.$$eval("#step math mo", (all) => Math.max(...all.filter(({ textContent }) => textContent === "∫").map((sign) => sign.getBoundingClientRect().height / parseFloat(getComputedStyle(sign).fontSize))));
+  assert.ok(tallest > 2, `an integral sign is ${tallest} em high`);
+  await done();
+});
+
 test("a teacher presents: F, PageDown, arrow keys, and labels of 24 px", async () => {
   const { page, done } = await open(`${LECTURE}&step=1`, { viewport: { width: 1920, height: 1080 } });
   await drawn(page, 1);
