@@ -538,6 +538,26 @@ test("the first step of the lecture plays, pauses, steps, is dragged and read", 
   await done();
 });
 
+test("step 6 draws the map beside its tables, which sin θ changes at the poles", async () => {
+  const { page, done } = await open(`${LECTURE}&step=6`);
+  await drawn(page, 1);
+  const frames = await page.$$eval("#figure .tables [data-frame]", (all) => all.map((framed) => { const { left, right, top, bottom } = framed.getBoundingClientRect(); return { left, right, top, bottom }; }));
+  assert.equal(frames.length, 3);
+  const [map, rows, columns] = frames, near = (a, b) => assert.ok(Math.abs(a - b) < 2, `${a} ${b}`);
+  // Rows stand beside those of the map, and columns below theirs.
+  near(map.top, rows.top);
+  near(map.bottom, rows.bottom);
+  near(map.left, columns.left);
+  near(map.right, columns.right);
+  assert.ok(rows.left >= map.right && columns.top >= map.bottom);
+  const [exact, plain] = /have ([\d.]+) with sin θ and ([\d.]+) without/.exec(await text(page, "#figure .result")).slice(1).map(Number);
+  assert.ok(plain > 3 * exact, `${plain} ${exact}`);
+  assert.match(await text(page, "#step details p"), new RegExp(`have probability ${plain} instead of ${exact}`));
+  await page.mouse.move((rows.left + rows.right) / 2, (rows.top + rows.bottom) / 2);
+  await page.waitForFunction(() => /^Row 3[12] has sin θ = 1\.00 .*∑ p\(y\) = 1\.00/.test(document.querySelector("#figure .readout").textContent));
+  await done();
+});
+
 /** Steps and the place in their first plot or map, as shares of it, where something can be dragged, and to where. */
 const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[0.45, 0.5], [0.35, 0.5]], 4: [[0.4, 0.4], [0.25, 0.6]], 5: [[0.6, 0.5], [0.4, 0.5]],
   6: [[0.5, 0.3], [0.5, 0.7]], 7: [[0.3, 0.3], [0.6, 0.5]], 8: [[0.6, 0.5], [0.8, 0.5]], 9: [[0.6, 0.5], [0.75, 0.5]], 10: [[0.5, 0.7], [0.5, 0.4]], 11: [[0.5, 0.5], [0.7, 0.5]], 12: [[0.9, 0.5], [0.4, 0.4]],

@@ -1,7 +1,7 @@
 // Steps 6 and 7: rows and columns of the map, and its samples.
 
-import { short } from "../dom";
-import { plot } from "../plot";
+import { h, short } from "../dom";
+import { figureWidth, framed } from "../plot";
 import type { Stage } from "../stage";
 import type { Point } from "./curves";
 import { COLUMNS, HEIGHT, SmallMap, WIDTH, canvas, cosine, direction, dot, type Vector } from "./small_map";
@@ -32,37 +32,71 @@ function rim(context: CanvasRenderingContext2D, place: Point, angle: number) {
 /** Rows of the table of step 6. */
 const ROWS = 64;
 
+/** The map with its tables beside it: the rows' on the right, and the chosen row's columns below. */
+class Tables {
+  readonly element = h("div", { class: "tables" });
+  private rowPlace = h("div");
+  private columnPlace = h("div");
+
+  constructor(map: HTMLCanvasElement) {
+    this.element.append(map, this.rowPlace, this.columnPlace);
+  }
+
+  /** The probabilities of rows, those without sin θ, and those of the columns of row `y`; `top` ends the axis of rows. */
+  show(rows: number[], plain: number[], columns: number[], y: number, top: number) {
+    // The map has this size in a figure of this width.
+    const whole = figureWidth(), width = TABLE.map * whole, height = width / 2, [across, below] = [TABLE.rows * whole, 96], name = 16;
+    const length = (p: number) => Math.min(p / top, 1) * across, unit = height / ROWS;
+    const bars = rows.map((p, i) => `<rect class="${i === y ? "light" : "lobe"} fill${i === y ? "" : " faint"}" x="0" y="${(i * unit).toFixed(2)}" width="${length(p).toFixed(1)}" height="${(0.9 * unit).toFixed(2)}"/>`);
+    const curve = (of: (i: number) => number) => rows.map((_, i) => `${of(i).toFixed(1)},${((i + 0.5) * unit).toFixed(1)}`).join("L");
+    const label = (x: number, at: number, text: string, kind = "") => `<text class="name halo ${kind}" x="${x}" y="${at}">${text}</text>`;
+    this.rowPlace.innerHTML = `<svg viewBox="0 0 ${across} ${height}"${framed({ left: 0, right: across, top: 0, bottom: height, xs: [0, top], ys: [ROWS, 0] })} aria-hidden="true"><path class="axis" d="M0 0V${height}"/>${bars.join("")}
+      <path class="estimate line" d="M${curve((i) => across * Math.sin(Math.PI * (i + 0.5) / ROWS))}"/><path class="light line dashed" d="M${curve((i) => length(plain[i]))}"/></svg>`;
+    const most = Math.max(...columns), w = width / columns.length, high = (p: number) => p / most * (below - name);
+    this.columnPlace.innerHTML = `<svg viewBox="0 0 ${width} ${below}"${framed({ left: 0, right: width, top: name, bottom: below, xs: [0, columns.length], ys: [0, most] })} aria-hidden="true">${columns.map((p, x) => `<rect class="light fill faint" x="${(x * w).toFixed(2)}" y="${(below - high(p)).toFixed(1)}" width="${(0.9 * w).toFixed(2)}" height="${high(p).toFixed(1)}"/>`).join("")}
+      <path class="axis" d="M0 ${below}H${width}"/>${label(0, 12, `p(x | y = ${y}), up to ${short(most)}`)}</svg>`;
+    const swatch = (kind: string, text: string) => `<tspan class="key ${kind}">■</tspan> ${text}`;
+    const keys = [swatch("lobe", "p(y)"), swatch("estimate", "sin θ"), swatch("light", "without sin θ")];
+    this.element.querySelector(".keys")?.remove();
+    this.element.insertAdjacentHTML("beforeend", `<svg class="keys" viewBox="0 0 ${across} ${below}" aria-hidden="true">${keys.map((key, i) => `<text class="name" x="0" y="${16 + 18 * i}">${key}</text>`).join("")}<text x="0" y="${16 + 18 * keys.length}">p up to ${short(top)}</text></svg>`);
+  }
+}
+/** The widths of the map and of the table of rows, as shares of the figure's. */
+const TABLE = { map: 0.72, rows: 0.265 };
+
 export const rowsAndColumns = (stage: Stage) => {
   const weighted = stage.choice("Row weights", [["solid-angle", "with sin θ"], ["alike", "equal (wrong)"]]);
   const chosen = stage.slider("Row", 0, ROWS - 1, 1, 24);
   stage.play(chosen, 1);
-  // The row is dragged on the map and in the plot of the rows.
-  const pointed = stage.pointer(({ frame, x, y }) => { if (frame < 2) chosen.set(Math.min(Math.floor(frame === 0 ? y * ROWS : x + 0.5), ROWS - 1)); });
-  let map: SmallMap | null = null;
+  // The row is dragged on the map and in its table.
+  const rowAt = (share: number) => Math.min(Math.floor(share), ROWS - 1);
+  const pointed = stage.pointer(({ frame, y }) => { if (frame < 2) chosen.set(rowAt(frame === 0 ? y * ROWS : y)); });
+  let map: SmallMap | null = null, tables: Tables | null = null;
   stage.draw(async () => {
     const width = 2 * ROWS, y = chosen();
     map ??= await SmallMap.of(stage);
-    const { rows, columns } = JSON.parse(await stage.app.engines.call("rowProbabilities", width, y, weighted() === "solid-angle")) as { rows: number[]; columns: number[] };
-    const points = (values: number[]) => values.map((p, i): Point => [i, p]);
+    const ask = async (isWeighted: boolean) => JSON.parse(await stage.app.engines.call("rowProbabilities", width, y, isWeighted)) as { rows: number[]; columns: number[] };
+    const [exact, plain] = [await ask(true), await ask(false)], { rows, columns } = weighted() === "solid-angle" ? exact : plain;
     // A row with a sun would flatten all others, so its bar is cut.
     const most = Math.max(...rows), others = [...rows].sort((a, b) => a - b)[Math.floor(0.95 * ROWS)];
     const top = most > 4 * others ? 2 * others : most;
-    const cut = top < most ? `; row ${rows.indexOf(most)} reaches ${short(most)}` : "";
     const context = canvas(stage, `The map, with row ${y}`);
     map.paint(context);
     context.lineWidth = 2;
     context.strokeStyle = "#ffd34d";
     context.strokeRect(1, y / ROWS * HEIGHT, WIDTH - 2, HEIGHT / ROWS);
-    stage.svg(plot([{ name: `p(y)${cut}`, kind: "lobe", points: points(rows), as: "bars" }, { name: "", kind: "light", points: [[y, rows[y]]], as: "dots" }],
-      { x: { name: "row y, from the top; drag it here or on the map", range: [-1, ROWS] }, y: { name: "probability of a row", range: [0, top] }, height: 170 })
-      + plot([{ name: `p(x | y = ${y})`, kind: "light", points: points(columns), as: "bars" }],
-        { x: { name: "column x", range: [-1, width] }, y: { name: "probability of a column", range: [0, Math.max(...columns)] }, height: 170 }), "Probabilities of the rows, and of the columns in the chosen row", context.canvas as HTMLCanvasElement);
-    const over = pointed(), column = over ? Math.min(Math.max(Math.round(over.x), 0), width - 1) : 0;
-    stage.read(!over ? null : over.frame === 0 ? `${map.read([over.x, over.y])}; row ${Math.min(Math.floor(over.y * ROWS), ROWS - 1)} has probability ${short(rows[Math.min(Math.floor(over.y * ROWS), ROWS - 1)])}.`
-      : over.frame === 1 ? `Row ${Math.min(column, ROWS - 1)} has probability ${short(rows[Math.min(column, ROWS - 1)])}. ∑ p(y) = ${rows.reduce((a, b) => a + b, 0).toFixed(2)}.`
-        : `Column ${column} of row ${y} has probability ${short(columns[column])}. ∑ p(x | y) = ${columns.reduce((a, b) => a + b, 0).toFixed(2)}.`);
-    const poles = [...rows.slice(0, 4), ...rows.slice(-4)].reduce((a, b) => a + b, 0);
-    stage.say(`Row ${y} has probability ${short(rows[y])}; the four rows at each pole together have ${short(poles)}.`);
+    tables ??= new Tables(context.canvas as HTMLCanvasElement);
+    tables.show(rows, plain.rows, columns, y, top);
+    if (!tables.element.isConnected) stage.drawing.replaceChildren(tables.element);
+    const over = pointed(), row = over ? rowAt(over.frame === 0 ? over.y * ROWS : over.y) : 0, column = over ? Math.min(Math.floor(over.x), width - 1) : 0;
+    const ofRow = `row ${row} has sin θ = ${Math.sin(Math.PI * (row + 0.5) / ROWS).toFixed(2)} and probability ${short(rows[row])}, without sin θ ${short(plain.rows[row])}`;
+    stage.read(!over ? null : over.frame === 0 ? `${map.read([over.x, over.y])}; ${ofRow}.`
+      : over.frame === 1 ? `${ofRow[0].toUpperCase()}${ofRow.slice(1)}. ∑ p(y) = ${rows.reduce((a, b) => a + b, 0).toFixed(2)}.`
+        : `Column ${column} of row ${y} has probability ${short(columns[column])}; the texel has p(y) · p(x | y) = ${short(rows[y] * columns[column])}. ∑ p(x | y) = ${columns.reduce((a, b) => a + b, 0).toFixed(2)}.`);
+    const poles = (of: number[]) => short([...of.slice(0, 4), ...of.slice(-4)].reduce((a, b) => a + b, 0));
+    const cut = top < most ? ` The bar of row ${rows.indexOf(most)} is cut: it reaches ${short(most)}.` : "";
+    stage.say(`Row ${y} has probability ${short(rows[y])}. The four rows at each pole together have ${poles(exact.rows)} with sin θ and ${poles(plain.rows)} without.${cut}`);
+    stage.answer(`The rows at the top and bottom: together, the four at each pole have probability ${poles(plain.rows)} instead of ${poles(exact.rows)}. Under a constant sky all rows would be equally likely, although the upper edge of the top row is a single point.`);
   });
 };
 
