@@ -50,6 +50,13 @@ export class Stage {
     return slider;
   }
 
+  /** Shows or hides a slider and its playback. */
+  show({ input }: Slider, isShown: boolean) {
+    const label = input.closest("label")!, next = label.nextElementSibling as HTMLElement | null;
+    label.hidden = !isShown;
+    if (next?.classList.contains("player")) next.hidden = !isShown;
+  }
+
   /** Adds playback that moves a slider by `by` at each step. */
   play({ input }: Slider, by: number) {
     input.closest("label")!.after(player(input, by, () => !this.isDrawing));

@@ -157,6 +157,7 @@ export const STEPS: Step[] = [
     text: [
       "The density proportional to reflectance times cosine times light follows the whole integrand but its visibility. Its normalization is the picture without shadows, the unoccluded radiance. It is the best density where nothing is occluded, and only there: where most of the product is in shadow, a density that sends more rays to the visible rest, even one of the two factors, may have less variance.",
       "Reflectance, cosine and light cancel against the density: what remains of each sample is the unoccluded radiance, times its visibility. Only the binary visibility has variance: zero without occlusion and in full shadow, largest where half of the light is occluded. Reflectance and light no longer contribute.",
+      "On the sphere, the figure shows these densities for a pixel of a shiny sphere in a nave, with samples of each, and pictures with equally many rays.",
     ],
     formulas: [
       row(ofKind("product", i("p"), par(wi)), eq, frac(row(fr, cos(i("i")), Li), Lns)), row(Lns, eq, int(i("Ω")), fr, cos(i("i")), Li, d, wi),

@@ -558,6 +558,45 @@ test("step 6 draws the map beside its tables, which sin θ changes at the poles"
   await done();
 });
 
+test("step 9 shows the densities of a picked pixel on the sphere, and pictures that sample light and product", async () => {
+  const { page, done } = await open(`${LECTURE}&step=9&figure=0.5;0.08;0.6;sphere;3`);
+  await drawn(page, 1);
+  const result = () => text(page, "#figure .result");
+  const [light, product] = /RMSE is ([\d.]+) where the light is sampled and ([\d.]+) where the product is/.exec(await result()).slice(1).map(Number);
+  assert.ok(product < 0.5 * light, await result());
+  assert.match(await result(), /At pixel 11, 11, ∫ p of the product is 1\.00/);
+  const boxes = async (selector) => Promise.all((await page.$$(selector)).map((canvas) => canvas.boundingBox()));
+  await page.locator("#figure .importance").scrollIntoViewIfNeeded();
+  const [picture] = await boxes("#figure .pictures canvas"), before = await figureOf(page);
+  await page.mouse.move(picture.x + 0.5 * picture.width, picture.y + 0.5 * picture.height);
+  await page.mouse.down();
+  await page.mouse.move(picture.x + 0.52 * picture.width, picture.y + 0.42 * picture.height, { steps: 2 });
+  await page.mouse.up();
+  await page.waitForFunction(() => /At pixel 16, 13,/.test(document.querySelector("#figure .result").textContent));
+  await settled(page);
+  assert.notEqual(await figureOf(page), before, "another pixel has other densities");
+  const [disc] = await boxes("#figure .discs canvas");
+  await page.mouse.move(disc.x + 0.3 * disc.width, disc.y + 0.3 * disc.height);
+  await page.waitForFunction(() => /^In this direction, L = [\d.]+, f · cos θ = .*, V = 1; densities: light .* per steradian/.test(document.querySelector("#figure .readout").textContent));
+  await done();
+});
+
+test("steps 14 and 15 show pictures under the lights, whose error falls with their number", async () => {
+  const { page, done } = await open(`${LECTURE}&step=14&figure=1;pictures`);
+  await drawn(page, 1);
+  const error = async () => Number(/lights is ([\d.]+)/.exec(await text(page, "#figure .result"))[1]);
+  const few = await error();
+  await slide(page, "#figure input", 6);
+  await page.waitForFunction(() => /with 64 lights/.test(document.querySelector("#figure .result").textContent));
+  assert.ok(await error() < few, `${await error()} % with 64 lights, ${few} % with 2`);
+  await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=15&figure=3;pictures`);
+  await page.waitForSelector("html[data-step='15']");
+  await drawn(page, 1);
+  assert.equal(await page.locator("#figure .quartet canvas").count(), 3);
+  assert.match(await text(page, "#figure .result"), /by variance minimization and [\d.]+\s% by median cut/);
+  await done();
+});
+
 /** Steps and the place in their first plot or map, as shares of it, where something can be dragged, and to where. */
 const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[0.45, 0.5], [0.35, 0.5]], 4: [[0.4, 0.4], [0.25, 0.6]], 5: [[0.6, 0.5], [0.4, 0.5]],
   6: [[0.5, 0.3], [0.5, 0.7]], 7: [[0.3, 0.3], [0.6, 0.5]], 8: [[0.6, 0.5], [0.8, 0.5]], 9: [[0.6, 0.5], [0.75, 0.5]], 10: [[0.5, 0.7], [0.5, 0.4]], 11: [[0.5, 0.5], [0.7, 0.5]], 12: [[0.9, 0.5], [0.4, 0.4]],

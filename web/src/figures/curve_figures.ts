@@ -3,6 +3,7 @@
 import { percentage, short } from "../dom";
 import { plot, type Series } from "../plot";
 import type { Stage } from "../stage";
+import { Importance } from "./importance";
 import { Table, clamp, gauss, generator, integral, light, line, normalized, top, type Point } from "./curves";
 
 /** The vertical line under the pointer. */
@@ -66,13 +67,22 @@ export const product = (stage: Stage) => {
   const width = stage.slider("Lobe", 0.02, 0.4, 0.01, 0.08, (x) => `width ${x}`);
   const hidden = stage.slider("Occluded from", 0, 1, 0.01, 0.6);
   stage.play(hidden, 0.02);
+  const where = stage.choice("Show", [["line", "in one dimension"], ["sphere", "on the sphere, and in pictures"]]);
+  const rays = stage.player("Rays", 0, 4, 3, (k) => String(2 ** k));
+  let onSphere: Importance | null = null;
   // Dragging moves the shadow's edge where it began there, and the lobe elsewhere.
   let ofEdge = false, begun: object | null = null;
-  const pointed = stage.pointer(({ x, from }) => {
+  const pointed = stage.pointer((at) => {
+    const { x, from } = at;
+    if (where() === "sphere") return onSphere?.drag(at);
     if (begun !== from) [begun, ofEdge] = [from, Math.abs(from.x - hidden()) < 0.04];
     (ofEdge ? hidden : center).set(x);
   });
-  stage.draw(() => {
+  stage.draw(async () => {
+    const isSphere = () => where() === "sphere", n = 2 ** rays();
+    for (const slider of [center, width, hidden]) stage.show(slider, !isSphere());
+    stage.show(rays, isSphere());
+    if (isSphere()) return (onSphere ??= new Importance(stage)).draw(n, pointed(), () => isSphere() && n === 2 ** rays());
     const lobe = (x: number) => gauss(x, center(), width());
     const f = (x: number) => light(x) * lobe(x), total = integral(f, 4000), p = (x: number) => f(x) / total;
     const visible = Math.min(integral((x) => (x < hidden() ? p(x) : 0), 4000), 1), exact = visible * total;

@@ -1,10 +1,13 @@
 // Steps 14 and 15: the map's division into lights, by a method and by hand.
 
 import { h, short } from "../dom";
-import { Film, FilmView } from "../film";
+import { Film, FilmView, luminance } from "../film";
 import { plot, type Series } from "../plot";
+import { pixels, type Pointed } from "../pointer";
 import type { Stage } from "../stage";
+import { isBuiltinProbe } from "../state";
 import type { Point } from "./curves";
+import { Lab, errorOf, sizeOf, type Situation } from "./lab";
 import { COLUMNS, HEIGHT, SmallMap, WIDTH, canvas, cosine, direction, dot } from "./small_map";
 
 type Method = "median-cut" | "variance-minimization";
@@ -118,18 +121,72 @@ class Spheres {
 /** Pixels along an edge of a sphere's picture, which is drawn twice as large: matte shading is smooth, and the rim is cut. */
 const SPHERE = 80;
 
+/** The statue under a method's lights, beside others and the whole probe. */
+class Pictures {
+  private size: number;
+  private figures: { view: FilmView; caption: HTMLElement; name: string }[];
+  readonly element: HTMLElement;
+  private known = new Map<string, { film: Film; error: number }>();
+  /** Where the whole probe's picture begins, as a share of the width. */
+  border = 1;
+
+  constructor(private stage: Stage, private methods: Method[]) {
+    const size = (this.size = sizeOf(stage.app)), figures = [...methods.map((method) => NAMES[method]), "the whole probe"].map((name) => {
+      const element = h("canvas", { width: String(size), height: String(size), role: "img", "aria-label": `A statue under ${name}`, "data-frame": JSON.stringify(pixels(size, size)) });
+      const caption = h("figcaption", {}, name);
+      return { view: new FilmView(element, false), caption, name, figure: h("figure", {}, element, caption) };
+    });
+    this.figures = figures;
+    this.element = h("div", { class: "quartet" }, ...figures.map(({ figure }) => figure));
+  }
+
+  drag({ x }: Pointed) {
+    this.border = x / this.size > 0.98 ? 1 : x / this.size;
+  }
+
+  async draw(n: number, over: Pointed | null, isStill: () => boolean) {
+    const { size, stage } = this, { env, rows, rotate } = stage.app.state, lab = Lab.of(stage.app);
+    const of: Situation = { scene: "statue", material: "", ground: true, probe: env, rows, rotate, hidesEnvironment: false, size };
+    const truth = await lab.truth(of), found: { film: Film; error: number }[] = [];
+    for (const method of this.methods) {
+      if (!isStill()) return;
+      const strategy = `${method}:${n}`, key = JSON.stringify([strategy, of]);
+      if (!this.known.has(key)) {
+        const picture = await lab.render(of, strategy, Math.max(2, Math.min(16, 512 / n)));
+        this.known.set(key, { film: picture.film, error: Math.sqrt(Math.max(errorOf(picture, truth), 0)) });
+      }
+      found.push(this.known.get(key)!);
+    }
+    const exposure = truth[0].film.exposure(), films = [...found.map(({ film }) => film), truth[0].film];
+    this.figures.forEach(({ view, caption, name }, i) => {
+      view.set({ exposure, curve: "agx" });
+      view.show(0, films[i]);
+      view.show(1, this.border < 1 && i < found.length ? truth[0].film : null);
+      view.set({ divider: this.border });
+      caption.textContent = i < found.length ? `${name}: error ${percent(found[i].error)}` : name;
+    });
+    if (!this.element.isConnected) stage.drawing.replaceChildren(this.element);
+    const at = over && 4 * (Math.min(Math.floor(over.y), size - 1) * size + Math.min(Math.floor(over.x), size - 1));
+    stage.read(over && at !== null ? `Under the pointer, ${this.figures[over.frame].name} gives ${short(luminance(films[over.frame].pixels, at))}, the whole probe ${short(luminance(truth[0].film.pixels, at))}; drag to uncover it.` : null);
+    stage.say(`The picture’s relative RMSE with ${n} light${n > 1 ? "s" : ""} is ${found.map(({ error }, i) => `${percent(error)} by ${NAMES[this.methods[i]]}`).join(" and ")}. Each light casts a hard shadow of its own, so few lights show as steps; at edges, the noise of the camera’s samples counts, too.`);
+  }
+}
+
 /** A method's lights of the map, shown with those of the other method. */
 export const cuts = (method: Method, other: Method) => (stage: Stage) => {
   const isMinimized = method === "variance-minimization";
   const rounds = stage.player("Lights", 0, 9, 4, (k) => String(2 ** k));
-  const shown = stage.choice("Show", [["map", "regions on the map"], ["lights", "the lights alone"]]);
+  const shown = stage.choice("Show", [["map", "regions on the map"], ["lights", "the lights alone"], ...(isBuiltinProbe(stage.app.state.env) ? [["pictures", "pictures under the lights"] as [string, string]] : [])]);
   const refined = isMinimized ? stage.choice("Regions", [["refined", "joined and moved"], ["rectangles", "rectangles"]]) : () => "refined";
   const by = stage.choice("Cut", [["method", `by ${NAMES[method]}`], ["hand", "once, by hand"]]);
   const hand = stage.slider("Cut at", 0.05, 0.95, 0.005, 0.6);
   let map: SmallMap | null = null, held: { texel: number } | null = null, first: FirstCut | null = null, spheres: Spheres | null = null;
   // Dragging moves the cut, or holds a region, to compare it while the lights play.
-  const pointed = stage.pointer(({ x, y }) => {
-    if (by() === "hand") hand.set(Math.min(Math.max(x, 0.05), 0.95));
+  let pictures: Pictures | null = null;
+  const pointed = stage.pointer((at) => {
+    const { x, y } = at;
+    if (by() !== "hand" && shown() === "pictures") pictures?.drag(at);
+    else if (by() === "hand") hand.set(Math.min(Math.max(x, 0.05), 0.95));
     else held = { texel: Math.floor(y * HEIGHT) * WIDTH + Math.floor(x * WIDTH) };
   });
   let known: { key: string; rig: Rig; beside: Rig; regions: Uint32Array; films: Film[] } | null = null;
@@ -179,9 +236,10 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
   };
   stage.draw(async () => {
     const isByHand = by() === "hand", n = 2 ** rounds();
-    hand.input.closest("label")!.hidden = !isByHand;
+    stage.show(hand, isByHand);
     map ??= await SmallMap.of(stage);
     if (isByHand) return drawHand(map);
+    if (shown() === "pictures") return (pictures ??= new Pictures(stage, isMinimized ? [method, other] : [method])).draw(n, pointed(), () => shown() === "pictures" && n === 2 ** rounds() && by() !== "hand");
     const { rig, beside, regions, films } = await divide(n), over = pointed();
     const isAlone = shown() === "lights", context = canvas(stage, isAlone ? `${n} lights` : `The map in ${n} regions`);
     const at = over ? Math.min(Math.floor(over.y * HEIGHT), HEIGHT - 1) * WIDTH + Math.min(Math.floor(over.x * WIDTH), WIDTH - 1) : held?.texel;

@@ -1,11 +1,10 @@
 // Step 12: four ways to sample the direct illumination of a sphere, measured with repeats.
 
-import type { App } from "../app";
 import { h, short } from "../dom";
-import type { Host } from "../engines";
-import { Film, FilmView, luminance } from "../film";
+import { FilmView, luminance } from "../film";
 import { pixels } from "../pointer";
 import type { Stage } from "../stage";
+import { Lab, errorOf, sizeOf, sphere, type Rendered } from "./lab";
 
 /** The four ways: name, counts, the strategy at these counts, and one with few samples at a time for equal time. */
 const WAYS = [
@@ -14,34 +13,16 @@ const WAYS = [
   { name: "both", counts: "50 : 38", strategy: "mis:50:38", few: "mis:2:2" },
   { name: "resampling", counts: "15/800", strategy: "sir:15/800", few: "sir:1/53" },
 ];
-/** The settings of the reference pictures, of which there are two. */
-const TRUTH = { strategy: "product:16", spp: 16 };
 /** The engine's time for each way at equal time [ms]. */
 const EQUAL_TIME = 250;
-/** The most pixels along the pictures' edge, which is no longer than that of the Picture panel. */
-const MOST = 96;
-
-interface Rendered {
-  film: Film;
-  rays: number;
-  /** The time in the engine [ms], which is CPU time where the Worker has a core for itself. */
-  time: number;
-}
 
 /** One repeat of one way. */
 interface Run extends Rendered {
   error: number;
 }
 
-/** The mean relative squared error of a picture against two independent references, without their variance. */
-function errorOf({ film }: Rendered, [a, b]: Rendered[]): number {
-  let sum = 0;
-  for (let i = 0; i < film.pixels.length; i += 4) {
-    const [x, y, z] = [film, a.film, b.film].map((of) => luminance(of.pixels, i)), truth = (y + z) / 2;
-    sum += (x - y) * (x - z) / (truth * truth + 0.01);
-  }
-  return sum / (film.pixels.length / 4);
-}
+/** The repeats of each way, by size, share of diffuse reflectance, comparison and name. */
+const known = new Map<string, Run[]>();
 
 /** The mean of the runs' values, and its standard error, which takes two runs. */
 function mean(runs: Run[], of: (run: Run) => number): [number, number] {
@@ -52,79 +33,11 @@ function mean(runs: Run[], of: (run: Run) => number): [number, number] {
 
 const withError = ([m, sd]: [number, number], digits = 2) => `${short(Number(m.toPrecision(digits)))}${isFinite(sd) ? ` ± ${short(Number(sd.toPrecision(1)))}` : ""}`;
 
-/** A situation that the four ways render: the pictures' edge [pixels], and the share of diffuse reflectance. */
-interface Situation {
-  size: number;
-  share: number;
-}
-
-/** What renders the four ways: one picture after the other, kept as long as the page is open. */
-class Lab {
-  private static all = new WeakMap<App, Lab>();
-  static of(app: App): Lab {
-    const lab = Lab.all.get(app) ?? new Lab(app.engines.extra());
-    Lab.all.set(app, lab);
-    return lab;
-  }
-
-  /** The repeats of each way, by size, share of diffuse reflectance, comparison and name. */
-  readonly known = new Map<string, Run[]>();
-  private truths = new Map<string, Promise<Rendered[]>>();
-  private last: Promise<unknown> = Promise.resolve();
-  private token = 0;
-  private loaded = NaN;
-  private constructor(private host: Host) {}
-
-  /** Two reference pictures. */
-  truth(of: Situation): Promise<Rendered[]> {
-    const { strategy, spp } = TRUTH, key = JSON.stringify(of), found = this.truths.get(key) ?? Promise.all([1, 2].map(() => this.render(of, strategy, spp)));
-    this.truths.set(key, found);
-    return found;
-  }
-
-  /** Renders a picture when those before are done, stopped after so much of the engine's time if it is timed. */
-  render({ size, share }: Situation, strategy: string, spp: number, milliseconds = Infinity): Promise<Rendered> {
-    const next = this.last.then(async () => {
-      await this.load(share);
-      return this.start(size, strategy, spp, milliseconds);
-    });
-    this.last = next.catch(() => {});
-    return next;
-  }
-
-  private async load(share: number) {
-    if (this.loaded === share) return;
-    if (isNaN(this.loaded)) await this.host.call("loadEnvironment", JSON.stringify({ probe: "cathedral", rows: 128, rotate: 0, scale: 1, exposure: 0 }));
-    await this.host.call("loadScene", JSON.stringify({ scene: "sphere-orthographic", material: `phong:50:1:${share}`, ground: false }));
-    this.loaded = share;
-  }
-
-  private start(size: number, strategy: string, spp: number, milliseconds: number) {
-    return new Promise<Rendered>((resolve, reject) => {
-      const { host } = this, film = new Film(size, size), token = ++this.token;
-      let time = 0;
-      host.onRender = (message) => {
-        if (message.token !== token) return;
-        if (message.kind === "failed") reject(new Error(message.error));
-        if (message.kind !== "update") return;
-        film.put(message.windows, message.pixels);
-        time += message.milliseconds;
-        // Every pixel has at least one sample.
-        if (message.complete || (time >= milliseconds && message.statistics.samples >= 1)) {
-          host.send({ kind: "stop" });
-          resolve({ film, rays: message.statistics.shadowRays, time });
-        }
-      };
-      host.send({ kind: "render", token, settings: JSON.stringify({ width: size, height: size, spp, strategy, seed: token, hideEnvironment: true, camera: null, shard: [0, 1] }) });
-    });
-  }
-}
-
 export const fourWays = (stage: Stage) => {
   const by = stage.choice("Compare", [["counts", "at the counts above"], ["time", "at equal time"]]);
   const diffuse = stage.slider("Diffuse share", 0, 0.8, 0.1, 0);
   const repeats = stage.player("Repeats", 1, 12, 3, String);
-  const size = Math.min(stage.app.state.size, MOST);
+  const size = sizeOf(stage.app);
   const figures = WAYS.map(({ name, counts }) => {
     const canvas = h("canvas", { width: String(size), height: String(size), role: "img", "aria-label": `A sphere rendered by ${name}`, "data-frame": JSON.stringify(pixels(size, size)) });
     const caption = h("figcaption", {}, `${name}, ${counts}`);
@@ -134,7 +47,7 @@ export const fourWays = (stage: Stage) => {
   // Dragging moves the border between each picture and the reference.
   let border = 1;
   const pointed = stage.pointer(({ x }) => { border = x / size > 0.98 ? 1 : x / size; });
-  const lab = Lab.of(stage.app), { known } = lab;
+  const lab = Lab.of(stage.app);
   /** Shows the repeats that there are of those that are wanted. */
   const show = (all: Run[][], truth: Rendered[], timed: boolean, wanted: number) => {
     const n = all[0].length;
@@ -152,7 +65,7 @@ export const fourWays = (stage: Stage) => {
   };
   stage.draw(async () => {
     const share = diffuse(), timed = by() === "time", n = repeats();
-    const truth = await lab.truth({ size, share }), keyOf = (name: string) => `${size} ${share} ${timed} ${name}`, runsOf = ({ name }: { name: string }) => known.get(keyOf(name)) ?? [];
+    const truth = await lab.truth(sphere(size, share)), keyOf = (name: string) => `${size} ${share} ${timed} ${name}`, runsOf = ({ name }: { name: string }) => known.get(keyOf(name)) ?? [];
     // A figure that was left, or shows something else by now, renders no more.
     const isStill = () => stage.place.isConnected && share === diffuse() && timed === (by() === "time");
     // All ways have as many repeats at any time, so that the figure compares like with like.
@@ -160,14 +73,14 @@ export const fourWays = (stage: Stage) => {
       for (const way of WAYS) {
         const runs = runsOf(way);
         if (runs.length >= k || !isStill()) continue;
-        const picture = await (timed ? lab.render({ size, share }, way.few, 4096, EQUAL_TIME) : lab.render({ size, share }, way.strategy, 1));
+        const picture = await (timed ? lab.render(sphere(size, share), way.few, 4096, EQUAL_TIME) : lab.render(sphere(size, share), way.strategy, 1));
         known.set(keyOf(way.name), [...runs, { ...picture, error: errorOf(picture, truth) }]);
       }
       if (isStill()) show(WAYS.map((way) => runsOf(way).slice(0, k)), truth, timed, n);
     }
     if (!isStill()) return;
     const all = WAYS.map((way) => runsOf(way).slice(0, n)), over = pointed();
-    const at = over && 4 * (Math.min(Math.floor(size - over.y), size - 1) * size + Math.min(Math.floor(over.x), size - 1));
+    const at = over && 4 * (Math.min(Math.floor(over.y), size - 1) * size + Math.min(Math.floor(over.x), size - 1));
     if (over && at !== null) {
       const [seen, y] = [luminance(all[over.frame].at(-1)!.film.pixels, at), luminance(truth[0].film.pixels, at)];
       stage.read(`Under the pointer, ${WAYS[over.frame].name} has ${short(Number(seen.toPrecision(3)))}, the reference ${short(Number(y.toPrecision(3)))}${border < 1 ? "; right of the border is the reference" : "; drag to uncover the reference"}.`);
