@@ -52,6 +52,7 @@ const wi = sub(i("ω"), i("i")), wo = sub(i("ω"), i("o")), wh = sub(i("ω"), i(
 const fr = ofKind("lobe", sub(i("f"), i("r"))), cos = (x: string) => ofKind("lobe", thin, i("cos"), of, sub(i("θ"), x));
 const Li = ofKind("light", sub(i("L"), i("i"))), V = ofKind("visibility", i("V")), qLight = ofKind("light", sub(i("q"), i("m"))), qLobe = ofKind("lobe", sub(i("q"), i("n")));
 const phat = `<mover>${i("p")}${o("^")}</mover>`;
+const V_HAT = `<mover>${i("V")}${o("^")}</mover>`;
 const Lns = sub(i("L"), i("ns"));
 const overN = frac(n(1), i("N")), sumN = sum(row(i("j"), eq, n(1)), i("N"));
 
@@ -249,5 +250,38 @@ export const STEPS: Step[] = [
     question: "Which method has the smaller shading error with equally many lights, and by how much?",
     answer: "Variance minimization, as the numbers under the picture show; on a map without small bright lights the difference is smaller.",
     sources: [VIRIYOTHAI, DEBEVEC, "Lloyd, Least Squares Quantization in PCM, 1982."],
+  },
+  {
+    title: "Why stratification is steeper",
+    text: [
+      "Divide the samples’ square into N equal strata, with one sample in each. The variance of the mean is then the sum of the variances within the strata, divided by N²: what differs only between strata no longer counts.",
+      "A shadow’s edge crosses about √N of the N strata, and only these contribute. So the error falls with the power −¾ instead of −½. Smooth light varies in every stratum, but in proportion to its width, and the error falls with the power −1. Scrambled Sobol’ points, which this page’s strategies use, are stratified in many ways at once.",
+    ],
+    formulas: [row(i("Var"), of, ofKind("estimate", sub(i("I"), i("N"))), eq, frac(n(1), sup(i("N"), n(2))), sum(row(i("k"), eq, n(1)), i("N")), sub(i("Var"), i("k")), of, i("f")), row(i("edge:"), space, i("σ"), o("∝"), sqrt(frac(sqrt(i("N")), sup(i("N"), n(2)))), eq, sup(i("N"), row(o("−"), n(3), o("/"), n(4)))), row(i("smooth:"), space, i("σ"), o("∝"), sup(i("N"), row(o("−"), n(1))))],
+    question: "Which strata contribute to the error, and how does their share change with N? Press Play, then drag and tilt the edge.",
+    answer: "Those that the edge crosses. Their share falls as 1/√N, so the error falls faster than that of random samples.",
+    sources: ["Mitchell, Consequences of Stratified Sampling in Graphics, SIGGRAPH 1996.", "Owen, Monte Carlo Variance of Scrambled Net Quadrature, SIAM Journal on Numerical Analysis 1997.", PBRT],
+  },
+  {
+    title: "Learn the visibility",
+    text: [
+      "With the product as density, only visibility has variance. But pixels nearby know much of it. The default strategy, product, takes one candidate in each stratum of the light, with the weight W, and approximates the product by a control variate h, linear in each stratum, whose integral is known. A few pixels trace all of their candidates; from them, each stratum of other pixels has an estimate V̂ of its visibility.",
+      "What V̂ predicts needs no rays. The rest is estimated: candidates are traced with a probability π in proportion to their weight and to the standard deviation of visibility, and the weights W/π make up for those that are not. The estimate is unbiased for any V̂ and any h; the better they are, the smaller its variance.",
+    ],
+    formulas: [row(ofKind("estimate", sub(i("L"), i("r"))), eq, sum("", ""), ofKind("visibility", V_HAT), int(""), ofKind("lobe", i("h")), o("+"), sum("", ""), ofKind("visibility", V_HAT), par(i("W"), o("−"), ofKind("lobe", i("h"))), o("+"), sum(i("traced"), ""), frac(i("W"), i("π")), par(V, o("−"), ofKind("visibility", V_HAT))), row(i("π"), o("∝"), i("W"), sqrt(row(ofKind("visibility", V_HAT), par(n(1), o("−"), ofKind("visibility", V_HAT)))))],
+    question: "Where do the rays go, and what happens when the penumbra narrows?",
+    answer: "To the strata in which visibility is uncertain. A narrower penumbra leaves fewer of them, and less error for the same rays.",
+    sources: ["Ghosh and Heidrich, Correlated Visibility Sampling for Direct Illumination, The Visual Computer 2006.", "Clarberg and Akenine-Möller, Exploiting Visibility Correlation in Direct Illumination, EGSR 2008.", "Owen and Zhou, Safe and Effective Importance Sampling, JASA 2000.", "Madow, On the Theory of Systematic Sampling, Annals of Mathematical Statistics 1949."],
+  },
+  {
+    title: "A room with a window",
+    text: [
+      "Inside a room, the sky is the same as before, but nearly all of it is occluded. Neither light nor reflectance nor their product knows where the window is, so most rays end at a wall, and the few that pass carry all of the light.",
+      "Points on the window are another density: every ray passes. A scene may name its windows as portals; half of the default strategy’s candidates are then points on them. The figure computes a section of a room by quadrature; the built-in scene room has such a window and names it.",
+    ],
+    formulas: [row(i("p"), par(i("ω")), eq, frac(sup(i("r"), n(2)), row(i("A"), thin, i("cos"), of, sub(i("θ"), i("w"))))), row(frac(i("σ"), i("I")), eq, sqrt(row(frac(n(1), sup(i("I"), n(2))), int(""), frac(sup(par(fr, cos(i("i")), Li, V), n(2)), i("p")), d, i("ω"), o("−"), n(1))))],
+    question: "Which strategy finds the window best, and how many rays does it need? Drag the point, the window’s edges and the sun.",
+    answer: "None of the first four knows where the window is; points on it need the fewest rays.",
+    sources: [VEACH, "Bitterli, Novák and Jarosz, Portal-Masked Environment Map Sampling, EGSR 2015.", PBRT],
   },
 ];

@@ -13,11 +13,11 @@ const VIEWS = [
   ["picture", ""], ["picture-split", "panel=picture&strategy=brdf:4&beside=mis:1:1&material=ggx:0.2,0.1:0.9,0.6,0.3:correlated"], ["picture-error", "panel=picture&view=error&strategy=mis:1:1"],
   ["map", "panel=map&layer=target&strategy=mis:1:1"], ["map-angular", "panel=map&mapping=angular&layer=product&samples=6"], ["xray", "panel=xray"],
   ["lights", "panel=lights"], ["lights-steps", "panel=lights&refine=false&lights=12"], ["link", "scene=robot.glb&env=yard.hdr"],
-  ...Array.from({ length: 15 }, (_, i) => [`lecture-${String(i + 1).padStart(2, "0")}`, `panel=lecture&step=${i + 1}`]),
+  ...Array.from({ length: 18 }, (_, i) => [`lecture-${String(i + 1).padStart(2, "0")}`, `panel=lecture&step=${i + 1}`]),
   ["embed", "panel=lecture&step=9", "?embed=step"],
 ];
 
-const STEPS = Array.from({ length: 15 }, (_, i) => i + 1);
+const STEPS = Array.from({ length: 18 }, (_, i) => i + 1);
 const wanted = (name) => !only.length || only.some((panel) => name.startsWith(panel));
 
 mkdirSync(folder, { recursive: true });

@@ -464,7 +464,7 @@ const drawn = (page, n) => page.waitForFunction((n) => Number(document.getElemen
 test("every step of the lecture has a figure that each of its controls changes", async () => {
   const { page, done } = await open(`${LECTURE}`);
   const steps = await page.$$eval("#steps a", (all) => all.length);
-  assert.equal(steps, 15);
+  assert.equal(steps, 18);
   for (let step = 1; step <= steps; step++) {
     await showStep(page, step);
     assert.ok(await page.$("#step math"), `step ${step} has a formula`);
@@ -600,11 +600,11 @@ test("steps 14 and 15 show pictures under the lights, whose error falls with the
 /** Steps and the place in their first plot or map, as shares of it, where something can be dragged, and to where. */
 const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[0.45, 0.5], [0.35, 0.5]], 4: [[0.4, 0.4], [0.25, 0.6]], 5: [[0.6, 0.5], [0.4, 0.5]],
   6: [[0.5, 0.3], [0.5, 0.7]], 7: [[0.3, 0.3], [0.6, 0.5]], 8: [[0.6, 0.5], [0.8, 0.5]], 9: [[0.6, 0.5], [0.75, 0.5]], 10: [[0.5, 0.7], [0.5, 0.4]], 11: [[0.5, 0.5], [0.7, 0.5]], 12: [[0.9, 0.5], [0.4, 0.4]],
-  13: [[0.4, 0.5], [0.6, 0.5]], 14: [[0.03, 0.3], [0.97, 0.6]], 15: [[0.16, 0.3], [0.66, 0.8]] };
+  13: [[0.4, 0.5], [0.6, 0.5]], 14: [[0.03, 0.3], [0.97, 0.6]], 15: [[0.16, 0.3], [0.66, 0.8]], 16: [[0.5, 0.5], [0.6, 0.3]], 17: [[0.5, 0.5], [0.7, 0.5]], 18: [[0.5, 0.7], [0.65, 0.7]] };
 
 test("the figure of every step plays, pauses, is dragged and read", async (t) => {
   const { page, done } = await open(LECTURE);
-  for (let step = 1; step <= 15; step++) await t.test(`step ${step}`, async () => {
+  for (let step = 1; step <= 18; step++) await t.test(`step ${step}`, async () => {
     await showStep(page, step);
     // From its last step, a figure would start over.
     await page.$eval("#figure .player", (player) => {
@@ -744,7 +744,7 @@ test("a teacher presents: F, PageDown, arrow keys, and labels of 24 px", async (
     assert.ok(await label() >= 24, `step ${step}: ${await label()} px`);
   }
   // Question and figure of every step are on the screen.
-  for (let step = 2; step <= 15; step++) {
+  for (let step = 2; step <= 18; step++) {
     await page.keyboard.press("PageDown");
     await page.waitForSelector(`html[data-step='${step}']`);
     await drawn(page, 1);
@@ -778,16 +778,16 @@ test("a link shows the lecture's figure as it was left", async () => {
 });
 
 test("the lecture is read by keys, and its figures follow the window", async () => {
-  const { page, done } = await open(`${LECTURE}&step=13`);
+  const { page, done } = await open(`${LECTURE}&step=16`);
   await page.waitForSelector("#figure svg");
   const [next, previous] = ["Next →", "← Previous"].map((name) => page.locator(`#step .steps button:has-text("${name}")`));
   await next.focus();
   await page.keyboard.press("Enter");
-  await page.waitForSelector("html[data-step='14']");
+  await page.waitForSelector("html[data-step='17']");
   await page.keyboard.press("Enter");
-  await page.waitForSelector("html[data-step='15']");
+  await page.waitForSelector("html[data-step='18']");
   assert.equal(await page.evaluate(() => document.activeElement.tagName), "H2", "there is no next step");
-  for (const step of [14, 13]) {
+  for (const step of [17, 16]) {
     await previous.focus();
     await page.keyboard.press("Enter");
     await page.waitForSelector(`html[data-step='${step}']`);
@@ -854,7 +854,7 @@ test("all steps are printed, with and without answers", async () => {
     await page.click("#print-all");
     await page.waitForFunction(() => window.printed);
     const steps = await page.$$eval("#handout article", (all) => all.map((article) => [!!article.querySelector(".figure :is(svg, canvas)"), article.querySelector(".result").textContent, !!article.querySelector("details"), article.querySelector(".address").textContent]));
-    assert.equal(steps.length, 15);
+    assert.equal(steps.length, 18);
     for (const [i, [figure, result, answer, address]] of steps.entries()) {
       assert.ok(figure && /\d/.test(result), `step ${i + 1} has its figure`);
       assert.equal(answer, answers);
