@@ -757,6 +757,109 @@ test("a teacher presents: F, PageDown, arrow keys, and labels of 24 px", async (
   await done();
 });
 
+test("a teacher's way: a link to step 9, F, the sun is dragged, the densities are read, to the picture and back, and the handout", async () => {
+  const { page, done } = await open(`${LECTURE}&step=9`, { viewport: { width: 1920, height: 1080 }, script: "window.print = () => { window.printed = true; };" });
+  await drawn(page, 1);
+  await page.keyboard.press("f");
+  await page.waitForSelector("html[data-presenting]");
+  await settled(page);
+  const place = (x, y) => page.$eval("#figure [data-frame]", (framed, [x, y]) => {
+    const { left, right, top, bottom, xs, ys } = JSON.parse(framed.dataset.frame), box = framed.getBoundingClientRect(), scale = box.width / framed.viewBox.baseVal.width;
+    return [box.left + scale * (left + (right - left) * (x - xs[0]) / (xs[1] - xs[0])), box.top + scale * (bottom - (bottom - top) * (y - ys[0]) / (ys[1] - ys[0]))];
+  }, [x, y]);
+  const values = () => page.$$eval("#figure input", (all) => all.map(({ value }) => Number(value)));
+  const before = await figureOf(page), [mirror, , edge] = await values();
+  await page.mouse.move(...await place(0.35, 0.8));
+  await page.mouse.down();
+  await page.mouse.move(...await place(0.45, 0.8), { steps: 4 });
+  await page.mouse.up();
+  await settled(page);
+  const moved = await values();
+  assert.ok(Math.abs(moved.at(-1) - 0.45) < 0.015, `the sun is at ${moved.at(-1)}`);
+  assert.deepEqual([moved[0], moved[2]], [mirror, edge], "nothing else moves");
+  assert.notEqual(await figureOf(page), before);
+  // At the sun, the light's density is largest, and the densities are what quadrature finds.
+  const read = () => page.$eval("#figure .readout", (e) => e.textContent);
+  const densities = (text) => ["light", "lobe", "product"].map((name) => Number(new RegExp(`${name} ([\\d.]*\\d)`).exec(text.split("densities:")[1])[1]));
+  await page.mouse.move(...await place(0.45, 0.5));
+  await page.waitForFunction(() => /^Direction 0\.45: .* densities: .* ∫ p = 1\.00\.$/.test(document.querySelector("#figure .readout").textContent));
+  const gauss = (x, mean, width) => Math.exp(-0.5 * ((x - mean) / width) ** 2), n = 20000;
+  const [light, lobe] = [(x) => 0.15 + 4 * gauss(x, 0.45, 0.02) + 0.7 * gauss(x, 0.75, 0.15), (x) => gauss(x, 0.5, 0.08)];
+  const at = Number(/L = ([\d.]+)/.exec(await read())[1]), there = densities(await read());
+  assert.ok(Math.abs(at / light(0.45) - 1) < 0.02, `L = ${at}`);
+  for (const [i, f] of [light, lobe, (x) => light(x) * lobe(x)].entries()) {
+    const total = Array.from({ length: n }, (_, k) => f((k + 0.5) / n)).reduce((a, b) => a + b, 0) / n;
+    assert.ok(Math.abs(there[i] * total / f(0.45) - 1) < 0.02, `density ${i} is ${there[i]}, not ${f(0.45) / total}`);
+  }
+  await page.keyboard.press("f");
+  await page.waitForSelector("html:not([data-presenting])");
+  await page.locator("#step .opens button", { hasText: "Picture" }).click();
+  await page.waitForSelector("#picture:not([hidden])");
+  await page.waitForFunction(() => window.domelight.picture.jobs.length === 2 && window.domelight.picture.jobs.every((job) => job.strategy));
+  await page.click("#back");
+  await page.waitForSelector("html[data-step='9'] #lecture:not([hidden])");
+  await drawn(page, 1);
+  assert.deepEqual(await values(), moved, "the figure is as it was left");
+  await page.click("#print-all");
+  await page.waitForFunction(() => window.printed, null, { timeout: 120_000 });
+  assert.equal(await page.locator("#handout article").count(), 18);
+  assert.match(await text(page, "#handout article:nth-child(9) .result"), /product is unoccluded/);
+  assert.ok((await page.pdf()).length > 100_000);
+  await done();
+});
+
+/** What a student does to a step's figure, by the labels of its controls, and what it then says: numbers that `holds`
+ *  compares, from one picture of the figure to the next. */
+const QUESTIONS = [
+  { step: 1, set: [{ Density: 0 }, { Density: 1 }], says: [/slope of the error is −0\.(4[5-9]|5[0-5])/, /every sample equals the integral/] },
+  { step: 2, set: [{ "Exponent n": 1 }, { "Exponent n": 200 }], reads: /density is ([\d.]+) .* ([\d.]+)\s% of the Phong/, holds: ([a, lostA], [b, lostB]) => b > 50 * a && lostB < lostA },
+  { step: 3, set: [{ "α along x": 0.1 }, { "α along x": 0.6 }], reads: /: ([\d.]+) along x, ([\d.]+) along y/, holds: ([x, y], [wide, same]) => wide > 3 * x && Math.abs(same - y) < 0.3 * y },
+  { step: 4, set: [{ Viewer: 10 }, { Viewer: 70 }], reads: /patches ([\d.]+) to/, holds: ([high], [low]) => low < 0.5 * high },
+  { step: 5, set: [{ Peak: 0.02 }], reads: /^(\d+) of (\d+)/, holds: ([inside, all]) => inside > all / 3 },
+  { step: 6, set: [{ "Row weights": "alike" }], reads: /have ([\d.]+) with sin θ and ([\d.]+) without/, holds: ([exact, plain]) => plain > 3 * exact },
+  { step: 7, set: [{ Samples: 11 }], reads: /\(([\d.]+)\s%\) .* holds ([\d.]+)\s%/, holds: ([samples, light]) => Math.abs(samples - light) < 4 },
+  { step: 8, set: [{ Lobe: -3 }, { Lobe: -0.3 }], says: [/least here: lobe alone/, /least here: light alone/] },
+  { step: 9, set: [{ "Occluded from": 1, "Mirror direction": 0.15 }], reads: /light ([\d.]+), lobe ([\d.]+), product ([\d.]+)/, holds: ([light, lobe, product]) => light > 1 && lobe > 1 && product === 0 },
+  { step: 10, set: [{ Envelope: 1 }, { Envelope: 2 }], reads: /^(\d+) of/, holds: ([tight], [loose]) => Math.abs(loose / tight - 0.5) < 0.1 },
+  { step: 10, set: [{ Envelope: 0.5 }], says: [/exceeds the envelope and is lost/] },
+  { step: 11, set: [{ "Candidates M": 0 }, { "Candidates M": 5 }], reads: /by ([\d.]+)\s% .* for ([\d.]+)\s%/, holds: ([few, noise], [many, same]) => few > 10 * noise && many < 1.5 * same },
+  { step: 12, set: [{ Repeats: 2 }], answers: /^For each ray, that is by error times rays, (resampling has the least error|\w+ and \w+ cannot be told apart)/ },
+  { step: 13, set: [{ "Shadow edge": 0.375 }, { "Shadow edge": 0.43 }], reads: /at N = 11 they are ([\d.]+) and ([\d.]*\d)/, holds: ([noise, bias], [same, other]) => Math.abs(same / noise - 1) < 0.1 && Math.abs(other / bias - 1) > 0.2 },
+  { step: 14, set: [{ Lights: 6 }], reads: /holds? ([\d.]+)\s% of its energy/, holds: ([share]) => share > 50 },
+  { step: 15, set: [{ Lights: 5 }], answers: /^With 32 lights of sky: matte, variance minimization has [\d.]+ times less/ },
+  { step: 16, set: [{ "Strata per side": 8 }, { "Strata per side": 32 }], reads: /(\d+) of (\d+) strata/, holds: ([a, n], [b, m]) => b / m < 0.35 * a / n, answers: /the slope here is −0\.7[2-8]/ },
+  { step: 16, set: [{ Integrand: "smooth" }], answers: /the slope here is −(1\.0|0\.9[5-9])/ },
+  { step: 17, set: [{ Penumbra: 0.3 }, { Penumbra: 0.02 }], reads: /deviation: ([\d.]+)\s% with learned visibility, ([\d.]+)/, holds: ([wide], [narrow, without]) => narrow < 0.5 * wide && narrow < 0.2 * without, answers: /^To the one stratum/ },
+  { step: 18, set: [{ Window: 1 }, { Window: 0.2 }], reads: /lobe (\d+), both \d+, product \d+, points on the window (\d+)/, holds: ([large, a], [small, b]) => small > 3 * large && a + b < 20, answers: /with the best of them, \d+ with points on the window/ },
+];
+
+test("a student's way: each question is answered by touching the figure", async (t) => {
+  const { page, done } = await open(LECTURE);
+  for (const { step, set, says, reads, holds, answers } of QUESTIONS) await t.test(`step ${step}: ${JSON.stringify(set.at(-1))}`, async () => {
+    await showStep(page, step);
+    const found = [];
+    for (const [i, values] of set.entries()) {
+      for (const [name, value] of Object.entries(values)) await page.$$eval("#figure label", (labels, [name, value]) => {
+        const control = labels.find((label) => label.firstChild.textContent === name).querySelector("input, select");
+        control.value = String(value);
+        for (const kind of ["input", "change"]) control.dispatchEvent(new Event(kind, { bubbles: true }));
+      }, [name, value]);
+      await settled(page);
+      const said = await text(page, "#figure .result");
+      if (says) assert.match(said, says[i]);
+      if (reads) {
+        assert.match(said, reads);
+        found.push(reads.exec(said).slice(1).map(Number));
+      }
+    }
+    if (holds) assert.ok(holds(...found), JSON.stringify(found));
+    await page.click("#step summary");
+    assert.ok(await page.isVisible("#step details p"));
+    if (answers) assert.match(await text(page, "#step details p"), answers);
+  });
+  await done();
+});
+
 test("a link shows the lecture's figure as it was left", async () => {
   const { page, done } = await open(`${LECTURE}&step=8&figure=-0.5;3;2`);
   await drawn(page, 1);

@@ -4,7 +4,7 @@ import { percentage, short } from "../dom";
 import { plot, type Series } from "../plot";
 import type { Stage } from "../stage";
 import { Importance } from "./importance";
-import { Table, clamp, gauss, generator, integral, light, line, normalized, top, type Point } from "./curves";
+import { Table, clamp, gauss, generator, integral, light, lightAt, line, normalized, top, type Point } from "./curves";
 
 /** The vertical line under the pointer. */
 const marker = (x: number | undefined, height: number): Series =>
@@ -69,21 +69,22 @@ export const product = (stage: Stage) => {
   stage.play(hidden, 0.02);
   const where = stage.choice("Show", [["line", "in one dimension"], ["sphere", "on the sphere, and in pictures"]]);
   const rays = stage.player("Rays", 0, 4, 3, (k) => String(2 ** k));
+  const sun = stage.slider("Sun", 0.05, 0.95, 0.01, 0.35);
   let onSphere: Importance | null = null;
-  // Dragging moves the shadow's edge where it began there, and the lobe elsewhere.
-  let ofEdge = false, begun: object | null = null;
+  // Dragging moves the sun or the shadow's edge where it began there, and the lobe elsewhere.
+  let dragged = center, begun: object | null = null;
   const pointed = stage.pointer((at) => {
     const { x, from } = at;
     if (where() === "sphere") return onSphere?.drag(at);
-    if (begun !== from) [begun, ofEdge] = [from, Math.abs(from.x - hidden()) < 0.04];
-    (ofEdge ? hidden : center).set(x);
+    if (begun !== from) [begun, dragged] = [from, [hidden, sun].find((slider) => Math.abs(from.x - slider()) < 0.04) ?? center];
+    dragged.set(x);
   });
   stage.draw(async () => {
     const isSphere = () => where() === "sphere", n = 2 ** rays();
-    for (const slider of [center, width, hidden]) stage.show(slider, !isSphere());
+    for (const slider of [center, width, hidden, sun]) stage.show(slider, !isSphere());
     stage.show(rays, isSphere());
     if (isSphere()) return (onSphere ??= new Importance(stage)).draw(n, pointed(), () => isSphere() && n === 2 ** rays());
-    const lobe = (x: number) => gauss(x, center(), width());
+    const lobe = (x: number) => gauss(x, center(), width()), light = lightAt(sun());
     const f = (x: number) => light(x) * lobe(x), total = integral(f, 4000), p = (x: number) => f(x) / total;
     const visible = Math.min(integral((x) => (x < hidden() ? p(x) : 0), 4000), 1), exact = visible * total;
     const q = normalized(light), r = normalized(lobe);
@@ -97,7 +98,7 @@ export const product = (stage: Stage) => {
       { name: "light", kind: "light", points: line(400, (x) => light(x) / mostLight) }, { name: "lobe", kind: "lobe", points: line(400, lobe) },
       { name: "product", kind: "product", points: line(400, (x) => p(x) / mostProduct), as: "area" },
       { name: "occluded", kind: "visibility", points: [[hidden(), 0], [1, 0]], as: "band" }, marker(at, 1.05),
-    ], { x: { name: "direction, drag the lobe or the shadow’s edge", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] }, presented: 480 }), "Light, lobe and their product");
+    ], { x: { name: "direction, drag the sun, the lobe or the shadow’s edge", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] }, presented: 480 }), "Light, lobe and their product");
     stage.read(at === undefined ? null : `Direction ${at.toFixed(2)}: L = ${short(light(at))}, f · cos θ = ${short(lobe(at))}, V = ${at < hidden() ? 1 : 0}; densities: light ${short(q(at))}, lobe ${short(r(at))}, product ${short(p(at))}. ∫ p = ${integral(p, 4000).toFixed(2)}.`);
     const least = Math.min(...deviations.map(([, d]) => d)), best = deviations.filter(([, d]) => d <= least + 1e-6).map(([name]) => name);
     stage.say(`${short(100 * visible)} % of the product is unoccluded. Standard deviation of one sample, relative to the unoccluded radiance: ${deviations.map(([name, d]) => `${name} ${short(d)}`).join(", ")}; least here: ${best.length === 3 ? "all alike" : best.join(" and ")}.`);

@@ -49,7 +49,8 @@ export class Table {
 }
 
 /** Light with a small bright lamp, on [0, 1]. */
-export const light = (x: number) => 0.15 + 4 * gauss(x, 0.35, 0.02) + 0.7 * gauss(x, 0.75, 0.15);
+export const lightAt = (lamp: number) => (x: number) => 0.15 + 4 * gauss(x, lamp, 0.02) + 0.7 * gauss(x, 0.75, 0.15);
+export const light = lightAt(0.35);
 
 /** The maximum of a function on [0, 1]. */
 export const top = (f: (x: number) => number) => Math.max(...line(400, f).map(([, y]) => y));
