@@ -277,7 +277,7 @@ export const STEPS: Step[] = [
     title: "A room with a window",
     text: [
       "Inside a room, the sky is the same as before, but nearly all of it is occluded. Neither light nor reflectance nor their product knows where the window is, so most rays end at a wall, and the few that pass carry all of the light.",
-      "Points on the window are another density: every ray passes. A scene may name its windows as portals; half of the default strategy’s candidates are then points on them. The figure computes a section of a room by quadrature; the built-in scene room has such a window and names it.",
+      "Points on the window are another density: every ray passes. A scene may name its windows as portals; half of the default strategy’s candidates are then points on them. The figure computes a section of a room by quadrature, and renders the built-in scene room, which has such a window and names it.",
     ],
     formulas: [row(i("p"), par(i("ω")), eq, frac(sup(i("r"), n(2)), row(i("A"), thin, i("cos"), of, sub(i("θ"), i("w"))))), row(frac(i("σ"), i("I")), eq, sqrt(row(frac(n(1), sup(i("I"), n(2))), int(""), frac(sup(par(fr, cos(i("i")), Li, V), n(2)), i("p")), d, i("ω"), o("−"), n(1))))],
     question: "Which strategy finds the window best, and how many rays does it need? Drag the point, the window’s edges and the sun.",

@@ -597,6 +597,24 @@ test("steps 14 and 15 show pictures under the lights, whose error falls with the
   await done();
 });
 
+test("step 18 renders the scene room, in which only the default strategy knows the window", async () => {
+  const { page, done } = await open(`${LECTURE.replace("size=32", "size=64")}&step=18&figure=64;light;2.5;1;1;30;scene`);
+  await drawn(page, 1);
+  const errors = /RMSE is ([\d.]+)\s% by the light, ([\d.]+)\s% by the lobe, ([\d.]+)\s% by both, and ([\d.]+)\s% by the default/.exec(await text(page, "#figure .result")).slice(1).map(Number);
+  assert.ok(errors.slice(0, 3).every((error) => error > 1.5 * errors[3]), `${errors}`);
+  assert.equal(await page.locator("#figure .quartet canvas").count(), 5);
+  const { x, y, width, height } = await page.locator("#figure .quartet canvas").first().boundingBox();
+  await page.mouse.move(x + 0.9 * width, y + 0.5 * height);
+  await page.waitForFunction(() => /^Under the pointer, light gives .*, the reference [\d.]+/.test(document.querySelector("#figure .readout").textContent));
+  const before = await figureOf(page);
+  await page.mouse.down();
+  await page.mouse.move(x + 0.3 * width, y + 0.5 * height, { steps: 2 });
+  await page.mouse.up();
+  await settled(page);
+  assert.notEqual(await figureOf(page), before, "the reference is uncovered");
+  await done();
+});
+
 /** Steps and the place in their first plot or map, as shares of it, where something can be dragged, and to where. */
 const DRAGS = { 1: [[0.9, 0.5], [0.9, 0.2]], 2: [[0.4, 0.4], [0.25, 0.6]], 3: [[0.45, 0.5], [0.35, 0.5]], 4: [[0.4, 0.4], [0.25, 0.6]], 5: [[0.6, 0.5], [0.4, 0.5]],
   6: [[0.5, 0.3], [0.5, 0.7]], 7: [[0.3, 0.3], [0.6, 0.5]], 8: [[0.6, 0.5], [0.8, 0.5]], 9: [[0.6, 0.5], [0.75, 0.5]], 10: [[0.5, 0.7], [0.5, 0.4]], 11: [[0.5, 0.5], [0.7, 0.5]], 12: [[0.9, 0.5], [0.4, 0.4]],

@@ -1,13 +1,13 @@
 // Steps 14 and 15: the map's division into lights, by a method and by hand.
 
 import { h, short } from "../dom";
-import { Film, FilmView, luminance } from "../film";
+import { Film, FilmView } from "../film";
 import { plot, type Series } from "../plot";
-import { pixels, type Pointed } from "../pointer";
 import type { Stage } from "../stage";
 import { isBuiltinProbe } from "../state";
 import type { Point } from "./curves";
-import { Lab, errorOf, sizeOf, type Situation } from "./lab";
+import { sizeOf } from "./lab";
+import { Pictures } from "./pictures";
 import { COLUMNS, HEIGHT, SmallMap, WIDTH, canvas, cosine, direction, dot } from "./small_map";
 
 type Method = "median-cut" | "variance-minimization";
@@ -15,7 +15,15 @@ interface Light { uv: Point; share: number; irradiance: number[] }
 interface Rig { lights: Light[]; diffuse: number; glossy: number }
 
 const percent = (x: number) => `${short(100 * x)} %`;
+
 const NAMES: Record<Method, string> = { "median-cut": "median cut", "variance-minimization": "variance minimization" };
+
+/** The statue under the lights of some methods; fewer camera samples where there are many lights. */
+function underLights(stage: Stage, methods: Method[]): Pictures {
+  const { env, rows, rotate } = stage.app.state, of = { scene: "statue", material: "", ground: true, probe: env, rows, rotate, hidesEnvironment: false, size: sizeOf(stage.app) };
+  const ways = methods.map((method) => ({ name: NAMES[method], strategy: (n: number) => `${method}:${n}`, samples: (n: number) => Math.max(2, Math.min(16, 512 / n)) }));
+  return new Pictures(stage, of, ways, "A statue", "the whole probe");
+}
 
 /** The lights within 2° of the brightest light, and their share of the energy. */
 function aroundBrightest(lights: Light[]): { count: number; share: number } {
@@ -121,57 +129,6 @@ class Spheres {
 /** Pixels along an edge of a sphere's picture, which is drawn twice as large: matte shading is smooth, and the rim is cut. */
 const SPHERE = 80;
 
-/** The statue under a method's lights, beside others and the whole probe. */
-class Pictures {
-  private size: number;
-  private figures: { view: FilmView; caption: HTMLElement; name: string }[];
-  readonly element: HTMLElement;
-  private known = new Map<string, { film: Film; error: number }>();
-  /** Where the whole probe's picture begins, as a share of the width. */
-  border = 1;
-
-  constructor(private stage: Stage, private methods: Method[]) {
-    const size = (this.size = sizeOf(stage.app)), figures = [...methods.map((method) => NAMES[method]), "the whole probe"].map((name) => {
-      const element = h("canvas", { width: String(size), height: String(size), role: "img", "aria-label": `A statue under ${name}`, "data-frame": JSON.stringify(pixels(size, size)) });
-      const caption = h("figcaption", {}, name);
-      return { view: new FilmView(element, false), caption, name, figure: h("figure", {}, element, caption) };
-    });
-    this.figures = figures;
-    this.element = h("div", { class: "quartet" }, ...figures.map(({ figure }) => figure));
-  }
-
-  drag({ x }: Pointed) {
-    this.border = x / this.size > 0.98 ? 1 : x / this.size;
-  }
-
-  async draw(n: number, over: Pointed | null, isStill: () => boolean) {
-    const { size, stage } = this, { env, rows, rotate } = stage.app.state, lab = Lab.of(stage.app);
-    const of: Situation = { scene: "statue", material: "", ground: true, probe: env, rows, rotate, hidesEnvironment: false, size };
-    const truth = await lab.truth(of), found: { film: Film; error: number }[] = [];
-    for (const method of this.methods) {
-      if (!isStill()) return;
-      const strategy = `${method}:${n}`, key = JSON.stringify([strategy, of]);
-      if (!this.known.has(key)) {
-        const picture = await lab.render(of, strategy, Math.max(2, Math.min(16, 512 / n)));
-        this.known.set(key, { film: picture.film, error: Math.sqrt(Math.max(errorOf(picture, truth), 0)) });
-      }
-      found.push(this.known.get(key)!);
-    }
-    const exposure = truth[0].film.exposure(), films = [...found.map(({ film }) => film), truth[0].film];
-    this.figures.forEach(({ view, caption, name }, i) => {
-      view.set({ exposure, curve: "agx" });
-      view.show(0, films[i]);
-      view.show(1, this.border < 1 && i < found.length ? truth[0].film : null);
-      view.set({ divider: this.border });
-      caption.textContent = i < found.length ? `${name}: error ${percent(found[i].error)}` : name;
-    });
-    if (!this.element.isConnected) stage.drawing.replaceChildren(this.element);
-    const at = over && 4 * (Math.min(Math.floor(over.y), size - 1) * size + Math.min(Math.floor(over.x), size - 1));
-    stage.read(over && at !== null ? `Under the pointer, ${this.figures[over.frame].name} gives ${short(luminance(films[over.frame].pixels, at))}, the whole probe ${short(luminance(truth[0].film.pixels, at))}; drag to uncover it.` : null);
-    stage.say(`The picture’s relative RMSE with ${n} light${n > 1 ? "s" : ""} is ${found.map(({ error }, i) => `${percent(error)} by ${NAMES[this.methods[i]]}`).join(" and ")}. Each light casts a hard shadow of its own, so few lights show as steps; at edges, the noise of the camera’s samples counts, too.`);
-  }
-}
-
 /** A method's lights of the map, shown with those of the other method. */
 export const cuts = (method: Method, other: Method) => (stage: Stage) => {
   const isMinimized = method === "variance-minimization";
@@ -239,7 +196,11 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
     stage.show(hand, isByHand);
     map ??= await SmallMap.of(stage);
     if (isByHand) return drawHand(map);
-    if (shown() === "pictures") return (pictures ??= new Pictures(stage, isMinimized ? [method, other] : [method])).draw(n, pointed(), () => shown() === "pictures" && n === 2 ** rounds() && by() !== "hand");
+    if (shown() === "pictures") {
+      const methods = isMinimized ? [method, other] : [method], errors = await (pictures ??= underLights(stage, methods)).draw(n, pointed(), () => shown() === "pictures" && n === 2 ** rounds() && by() !== "hand");
+      if (errors) stage.say(`The picture’s relative RMSE with ${n} light${n > 1 ? "s" : ""} is ${errors.map((error, i) => `${percent(error)} by ${NAMES[methods[i]]}`).join(" and ")}. Each light casts a hard shadow of its own, so few lights show as steps; at edges, the noise of the camera’s samples counts, too.`);
+      return;
+    }
     const { rig, beside, regions, films } = await divide(n), over = pointed();
     const isAlone = shown() === "lights", context = canvas(stage, isAlone ? `${n} lights` : `The map in ${n} regions`);
     const at = over ? Math.min(Math.floor(over.y * HEIGHT), HEIGHT - 1) * WIDTH + Math.min(Math.floor(over.x * WIDTH), WIDTH - 1) : held?.texel;

@@ -35,12 +35,14 @@ export interface Rendered {
   time: number;
 }
 
-/** The mean relative squared error of a picture against two independent references, without their variance. */
+/** The mean relative squared error of a picture against two independent references, without their variance; pixels below a
+ *  tenth of the mean count as if they had that. */
 export function errorOf({ film }: Rendered, [a, b]: Rendered[]): number {
-  let sum = 0;
+  let sum = 0, mean = 0;
+  for (let i = 0; i < a.film.pixels.length; i += 4) mean += luminance(a.film.pixels, i) / (a.film.pixels.length / 4);
   for (let i = 0; i < film.pixels.length; i += 4) {
     const [x, y, z] = [film, a.film, b.film].map((of) => luminance(of.pixels, i)), truth = (y + z) / 2;
-    sum += (x - y) * (x - z) / (truth * truth + 0.01);
+    sum += (x - y) * (x - z) / (truth * truth + 0.01 * mean * mean);
   }
   return sum / (film.pixels.length / 4);
 }

@@ -4,11 +4,26 @@ import { percentage, short } from "../dom";
 import { figureWidth, framed, isPresenting, plot } from "../plot";
 import type { Stage } from "../stage";
 import { clamp, generator } from "./curves";
+import { sizeOf } from "./lab";
+import { Pictures } from "./pictures";
 import { Plan, ROOM, WAYS, type Way } from "./plan";
 
 const ALL = Object.keys(WAYS) as Way[];
 /** The rays' share of the error that is wanted. */
 const WANTED = 0.1;
+
+/** Camera samples of each pixel of the pictures, and the rays of each. */
+const SAMPLES = 8, each = (rays: number) => Math.max(1, Math.round(rays / SAMPLES));
+
+/** The built-in scene by the strategies, with as many rays each. */
+function pictured(stage: Stage): Pictures {
+  const of = { scene: "room", material: "", ground: false, probe: "sky", rows: 128, rotate: 125, hidesEnvironment: false, size: sizeOf(stage.app) };
+  const half = (n: number) => Math.max(1, Math.round(each(n) / 2)), strategies = [
+    { name: "light", strategy: (n: number) => `environment:${each(n)}` }, { name: "lobe", strategy: (n: number) => `brdf:${each(n)}` },
+    { name: "both", strategy: (n: number) => `mis:${half(n)}:${half(n)}` }, { name: "default, with the window", strategy: (n: number) => `product:${each(n)}` },
+  ];
+  return new Pictures(stage, of, strategies.map((way) => ({ ...way, samples: () => SAMPLES })), "A room with a window", "the reference");
+}
 
 /** The room's section with rays from a point on its floor. */
 function section(plan: Plan, rays: (number | null)[], under: number | null): string {
@@ -35,10 +50,14 @@ export const roomWithWindow = (stage: Stage) => {
   const low = stage.slider("Sill", 0.3, 2.4, 0.05, 1, (x) => `${x} m`);
   const size = stage.slider("Window", 0.1, 2, 0.05, 1, (x) => `${x} m high`);
   const sun = stage.slider("Sun", -89, 89, 1, 30, (x) => `${Math.abs(x)}° ${x < 0 ? "toward the window" : "away from it"}`);
+  const show = stage.choice("Show", [["section", "a section of a room"], ["scene", "the scene room, rendered"]]);
+  let pictures: Pictures | null = null;
   const ends = () => [low(), Math.min(low() + size(), ROOM.height - 0.05)];
   // Dragging moves the sun or the window's nearer edge where it began there, and the point elsewhere.
   let begun: { from: object | null; isSun: boolean } = { from: null, isSun: false };
-  const pointed = stage.pointer(({ frame, x, y, from }) => {
+  const pointed = stage.pointer((at) => {
+    const { frame, x, y, from } = at;
+    if (show() === "scene") return pictures?.drag(at);
     if (frame !== 0) return;
     const [a, b] = ends();
     const { x: px } = new Plan(place(), a, b, 0), [sx, sy] = new Plan(px, a, b, sun() * Math.PI / 180).end(sun() * Math.PI / 180);
@@ -49,7 +68,14 @@ export const roomWithWindow = (stage: Stage) => {
     else if (Math.abs(from.y - a) < Math.abs(from.y - b)) low.set(clamp(y, 0.3, 2.4));
     else size.set(clamp(y - a, 0.1, 2));
   });
-  stage.draw(() => {
+  stage.draw(async () => {
+    const isScene = show() === "scene", n = rays();
+    for (const slider of [place, low, size, sun]) stage.show(slider, !isScene);
+    if (isScene) {
+      const errors = await (pictures ??= pictured(stage)).draw(n, pointed(), () => show() === "scene" && n === rays());
+      if (errors) stage.say(`With at most ${SAMPLES * each(n)} rays for each pixel, the relative RMSE is ${percentage(errors[0])} by the light, ${percentage(errors[1])} by the lobe, ${percentage(errors[2])} by both, and ${percentage(errors[3])} by the default strategy, which knows the window.`);
+      return;
+    }
     const [a, b] = ends(), plan = new Plan(place(), a, b, sun() * Math.PI / 180), random = generator(3), sample = plan.sampler(way() as Way);
     const drawn = Array.from({ length: rays() }, () => sample(random())), over = pointed(), under = over?.frame === 0 ? Math.atan2(over.x - plan.x, Math.max(over.y, 1e-3)) : null;
     const found = ALL.map((name) => ({ name, deviation: plan.deviation(name), share: plan.share(name) }));
