@@ -22,6 +22,8 @@ export async function printHandout(app: App, withAnswers: boolean) {
     await stage.firstDrawn;
     app.tell(`Drawing all figures: ${i + 1} of ${STEPS.length} …`);
   }
+  // Pictures are painted bit by bit.
+  while (place.querySelector("canvas[data-stale]")) await new Promise((done) => setTimeout(done, 20));
   app.tell("The handout is drawn");
   root.toggleAttribute("data-handout", true);
   addEventListener("afterprint", () => {
