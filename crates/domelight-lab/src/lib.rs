@@ -50,6 +50,7 @@ mod usage;
 
 pub use acceptance::{Acceptance, count_tries, warn_of_rare_acceptance};
 pub use error::{At, Error};
+pub use ground::Ground;
 pub use host::{Host, Silent, WorkProgress};
 pub use strategy::{NamedStrategy, refuse_repeating_points};
 pub use usage::{Seconds, Stopwatch, cpu_seconds, peak_memory, thread_seconds};

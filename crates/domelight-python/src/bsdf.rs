@@ -6,12 +6,13 @@ use domelight::math::{Vec2, Vec3};
 use numpy::PyArrayDyn;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyType;
+use pyo3::types::{PyString, PyType};
 
 use crate::arrays::{Floats, Pairs, array, rows};
 use crate::engine::alone;
 use crate::error::{bad_value, to_python};
 use crate::lobe::PythonLobe;
+use crate::notebook::lobe_svg;
 
 /// A sum of reflectance lobes in the local frame, whose z axis is the shading normal.
 ///
@@ -260,6 +261,11 @@ impl Bsdf {
         }
     }
 
+    /// Its lobe in the plane of incidence.
+    fn _repr_svg_(&self, py: Python<'_>) -> PyResult<String> {
+        self.plot(py)
+    }
+
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         match &slf.get().text {
             Some(text) => Ok((slf.get_type().getattr("parse")?, (text.clone(),))),
@@ -269,6 +275,18 @@ impl Bsdf {
 }
 
 impl Bsdf {
+    /// A plot of the lobe in the plane of incidence.
+    fn plot(&self, py: Python<'_>) -> PyResult<String> {
+        let title = self.text.as_deref().unwrap_or("BSDF of functions");
+        lobe_svg(title, |wo, wi| {
+            if let Some(lobe) = self.lobe {
+                return Ok(lobe.eval_pdf_rows(py, &vec![wo; wi.len()], wi)?.0);
+            }
+            let bsdf = self.inner.for_view(wo.into());
+            Ok(wi.iter().map(|&wi| bsdf.eval(wo.into(), wi.into())).collect())
+        })
+    }
+
     /// Directions, weights and densities; zeros where there is no sample.
     fn draw(&self, py: Python<'_>, wo: &[[f32; 3]], u: &[[f32; 3]]) -> PyResult<Vec<Drawn>> {
         let weighed = |wi: [f32; 3], value: Rgb, pdf: f32| {
@@ -334,6 +352,24 @@ impl<'py> FromPyObject<'_, 'py> for MaterialLike {
 }
 
 impl MaterialLike {
+    /// What was given.
+    pub(crate) fn object<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        match self {
+            Self::Text(text) => PyString::new(py, text).into_any(),
+            Self::Bsdf(bsdf) => bsdf.bind(py).clone().into_any(),
+            Self::Material(material) => material.bind(py).clone().into_any(),
+        }
+    }
+
+    /// Its text, if it has one.
+    pub(crate) fn text(&self) -> Option<String> {
+        match self {
+            Self::Text(text) => Some(text.clone()),
+            Self::Bsdf(bsdf) => bsdf.get().text.clone(),
+            Self::Material(material) => material.get().bsdf.get().text.clone(),
+        }
+    }
+
     pub(crate) fn bsdf(
         &self,
         py: Python<'_>,
@@ -368,6 +404,11 @@ impl Material {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         Ok(format!("Material({})", self.bsdf.bind(py).repr()?))
+    }
+
+    /// Its lobe in the plane of incidence.
+    fn _repr_svg_(&self, py: Python<'_>) -> PyResult<String> {
+        self.bsdf.get().plot(py)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Bsdf>,)) {

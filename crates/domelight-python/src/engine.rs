@@ -68,9 +68,17 @@ pub(crate) fn abandonable<T: Send + 'static>(
     py: Python<'_>,
     f: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
-    let n = n_threads(None)?;
+    let pool = pool(n_threads(None)?, &Arc::default())?;
+    abandonable_on(py, pool, f)
+}
+
+/// [`abandonable`] in a pool.
+pub(crate) fn abandonable_on<T: Send + 'static>(
+    py: Python<'_>,
+    pool: ThreadPool,
+    f: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
     py.detach(|| {
-        let pool = pool(n, &Arc::default())?;
         let (sender, results) = mpsc::channel();
         std::thread::spawn(move || {
             // Nobody receives it after a signal.

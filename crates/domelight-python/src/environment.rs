@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use domelight::environment::builtin::BuiltinProbe;
-use domelight::environment::io::{ProbeOptions, load_probe};
-use domelight::environment::mapping::Mapping;
+use domelight::environment::io::{ProbeOptions, Window, load_probe};
+use domelight::environment::mapping::{CubeFaces, Mapping};
 use domelight::environment::{self, EnvironmentDensity, EnvironmentSample, Orientation, UpAxis};
 use domelight::{Rgb, RgbImage};
 use numpy::PyArrayDyn;
@@ -99,6 +99,14 @@ pub(crate) fn load_map(py: Python<'_>, path: PathBuf, options: ProbeOptions) -> 
     Ok(probe.image)
 }
 
+/// The window of an OpenEXR file by its name.
+fn window(name: &str) -> PyResult<Window> {
+    Window::ALL
+        .into_iter()
+        .find(|window| window.name() == name)
+        .ok_or_else(|| bad_value(format!("window is {name:?}; it must be 'data' or 'display'")))
+}
+
 /// The map of a built-in probe.
 pub(crate) fn builtin_map(py: Python<'_>, name: &str, height: usize) -> PyResult<RgbImage> {
     let probe: BuiltinProbe = name.parse().map_err(|e| from_source(&e))?;
@@ -135,6 +143,11 @@ impl Environment {
     ///     As in the class.
     /// mapping : str, optional
     ///     The layout, such as 'lat-long', 'angular' or 'cross-vertical'; guessed by default.
+    /// faces : str, optional
+    ///     The faces of a cross or strip in the order in which they stand, such as 'F,R,B180,L,U,D'; a number is the
+    ///     degrees by which a face is turned clockwise.
+    /// window : {'data', 'display'}, optional
+    ///     The window of an OpenEXR file that is the map; by default the data window if it has the shape of a map.
     /// layer : str, optional
     ///     The OpenEXR layer.
     /// strict : bool, default False
@@ -156,7 +169,8 @@ impl Environment {
     /// DomelightWarning
     ///     If texels were repaired, or the format cannot store values above white.
     #[classmethod]
-    #[pyo3(signature = (path, *, rotation = 0.0, scale = 1.0, up = "y", mapping = None, layer = None, strict = false))]
+    #[pyo3(signature = (path, *, rotation = 0.0, scale = 1.0, up = "y", mapping = None, faces = None, window = None,
+        layer = None, strict = false))]
     fn load(
         cls: &Bound<'_, PyType>,
         path: PathBuf,
@@ -164,6 +178,8 @@ impl Environment {
         scale: f32,
         up: &str,
         mapping: Option<&str>,
+        faces: Option<&str>,
+        window: Option<&str>,
         layer: Option<String>,
         strict: bool,
     ) -> PyResult<Self> {
@@ -171,8 +187,12 @@ impl Environment {
         let orientation = Orientation { up: up_axis(up)?, rotation };
         let mapping: Option<Mapping> =
             mapping.map(|m| m.parse().map_err(|e| from_source(&e))).transpose()?;
+        let faces: Option<CubeFaces> =
+            faces.map(|f| f.parse().map_err(|e| from_source(&e))).transpose()?;
+        let window = window.map(self::window).transpose()?;
         let name = path.display().to_string();
-        let options = ProbeOptions { mapping, layer, strict, ..ProbeOptions::default() };
+        let options =
+            ProbeOptions { mapping, faces, window, layer, strict, ..ProbeOptions::default() };
         let map = load_map(py, path, options)?;
         Self::build(py, map, orientation, scale, name)
     }

@@ -1,5 +1,7 @@
 //! The pixel X-ray.
 
+use std::sync::Arc;
+
 use domelight::Rgb;
 use domelight::inspect::{Decomposition, DirectionHistogram, Hemisphere, PixelSummary, advice};
 use domelight::strategy::PreparedStrategy;
@@ -7,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{array, rows};
-use crate::engine::caught;
+use crate::engine::abandonable_on;
 use crate::environment::Environment;
 use crate::error::{bad_value, from_source, to_python};
 use crate::render::{Choice, Job, Keywords, choose};
@@ -56,7 +58,7 @@ pub(crate) fn inspect<'py>(
         tile_size: None,
         passes: "efficient",
     };
-    let job = &Job::new(py, scene.get(), env, keywords)?;
+    let job = Arc::new(Job::new(py, scene.get(), env, keywords)?);
     let inside = |[x, y]: [i64; 2]| Some([usize::try_from(x).ok()?, usize::try_from(y).ok()?]);
     let pixel = inside(pixel).ok_or_else(|| {
         let [x, y] = pixel;
@@ -67,7 +69,9 @@ pub(crate) fn inspect<'py>(
         .into_iter()
         .map(|(name, strategy)| Ok((name, choose(&strategy, 1, lobes)?)))
         .collect::<PyResult<Vec<_>>>()?;
-    let inspect = || -> PyResult<Found> {
+    let on_pool = job.clone();
+    let inspect = move || -> PyResult<Found> {
+        let job = &*on_pool;
         let inspector = job.inspector(pixel).map_err(|e| from_source(&e))?;
         let one = |(name, choice): &(String, Choice)| match choice {
             Choice::Builtin(spec) => {
@@ -87,10 +91,7 @@ pub(crate) fn inspect<'py>(
             strategies: choices.iter().map(one).collect::<PyResult<_>>()?,
         })
     };
-    let found = py.detach(|| {
-        let pool = job.pool()?;
-        caught(|| pool.install(inspect))?
-    });
+    let found = abandonable_on(py, job.pool()?, inspect)?;
     if let Some(error) = job.failure().take() {
         return Err(error);
     }

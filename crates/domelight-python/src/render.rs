@@ -13,6 +13,7 @@ use domelight::render::{
 use domelight::sampling::SamplerKind;
 use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
 use domelight::strategy::{PreparedStrategy, Strategy, StrategyKind, StrategySpec};
+use domelight_lab::Ground;
 use domelight_lab::names::file_name;
 use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
 use domelight_lab::scene::PreparedSceneRef;
@@ -20,6 +21,7 @@ use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
+use crate::bsdf::MaterialLike;
 use crate::engine::{caught, n_threads, pool, wait};
 use crate::environment::Environment;
 use crate::error::{RenderInterrupted, bad_value, from_source, to_python, warn};
@@ -241,6 +243,7 @@ impl Job {
     pub(crate) fn scene_report(&self) -> SceneReport {
         let Self { scene, environment, settings, camera_settings, probe, .. } = self;
         let orientation = environment.orientation();
+        let changes = scene.changes();
         let light = EnvironmentSettings {
             rotate_degrees: orientation.rotation,
             ..EnvironmentSettings::new(EnvironmentSource::Builtin(probe.clone()), orientation.up)
@@ -249,9 +252,9 @@ impl Job {
             scene: scene.name.clone(),
             triangles: scene.scene.triangle_count(),
             warnings: Vec::new(),
-            material: None,
-            normalize: false,
-            ground: None,
+            material: changes.material.as_ref().and_then(MaterialLike::text),
+            normalize: changes.normalize,
+            ground: changes.ground.then_some(Ground::Plate),
             hide_env: settings.background == Background::Hidden,
             environment: EnvironmentReport::new(probe.clone(), &light, environment),
             camera: CameraReport::new(camera_settings, scene.offset, None),

@@ -18,13 +18,14 @@ use domelight::{Rgb, RgbImage};
 use domelight_lab::names::file_name;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
-use pyo3::types::PyType;
+use pyo3::types::{PyBytes, PyType};
 
 use crate::arrays::{Floats, array, hashable, indices, rows};
 use crate::engine::{parallel, parallel_on};
 use crate::environment::{Environment, up_axis, up_name};
 use crate::error::{bad_value, from_source, to_python};
-use crate::picture::{Format as PictureFormat, write_image};
+use crate::notebook::balls;
+use crate::picture::{Format as PictureFormat, depth, to_png, tone, write_image};
 
 /// Directional lights that replace an environment, and its residual. Returned by `lights`.
 ///
@@ -217,6 +218,16 @@ impl Rig {
             let bytes = format.encode(&self.export(dome)).map_err(|e| from_source(&e))?;
             write_atomically(&path, |out| out.write_all(&bytes)).map_err(to_python)
         })?
+    }
+
+    /// Matte balls in the light of the rig; if there is a residual, also in its light and in that of both.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = parallel(py, || {
+            let (picture, alpha) = balls(&self.inner, self.residual.as_deref());
+            let tone = tone(&picture, Some(&alpha), None, "agx")?;
+            to_png(&picture, Some(&alpha), &tone, depth(8)?).map_err(|e| from_source(&e))
+        })??;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {

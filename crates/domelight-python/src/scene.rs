@@ -18,7 +18,7 @@ use domelight::scene::{
 use numpy::PyArrayDyn;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyType;
+use pyo3::types::{PyBool, PyFloat, PyString, PyTuple, PyType};
 
 use crate::arrays::{Floats, array, hashable, indices, vector};
 use crate::bsdf::MaterialLike;
@@ -26,6 +26,7 @@ use crate::engine::{abandonable, parallel};
 use crate::environment::{Environment, builtin_map, load_map, up_axis, up_name};
 use crate::error::{bad_value, from_source, to_python, warn};
 use crate::lobe::PythonLobe;
+use crate::recipe::{self, Recipe};
 
 /// A camera. Omitted parts come from the scene's own camera, or from one that frames the scene. Cameras can be pickled and
 /// compared.
@@ -329,9 +330,47 @@ pub(crate) struct SceneData {
     up: UpAxis,
     /// Reflectance written in Python.
     pub(crate) lobes: Vec<&'static PythonLobe>,
+    changes: Changes,
+    recipe: Recipe,
+}
+
+/// What is done to a scene after it was described.
+pub(crate) struct Changes {
+    pub(crate) material: Option<MaterialLike>,
+    pub(crate) ground: bool,
+    pub(crate) normalize: bool,
+}
+
+impl Changes {
+    /// The keywords of constructors.
+    fn keywords<'py>(&self, py: Python<'py>) -> [(&'static str, Option<Bound<'py, PyAny>>); 3] {
+        let set = |is: bool| is.then(|| PyBool::new(py, true).to_owned().into_any());
+        [
+            ("material", self.material.as_ref().map(|material| material.object(py))),
+            ("ground", set(self.ground)),
+            ("normalize", set(self.normalize)),
+        ]
+    }
 }
 
 impl SceneData {
+    /// Whether rays, cameras and light find the same.
+    fn is_same(&self, other: &Self) -> bool {
+        let lobe = |lobe: &&'static PythonLobe| std::ptr::from_ref::<PythonLobe>(*lobe);
+        let is_seen_alike = self.camera == other.camera
+            && self.cameras == other.cameras
+            && (self.up, self.offset) == (other.up, other.offset)
+            && self.environment == other.environment
+            && self.lobes.iter().map(lobe).eq(other.lobes.iter().map(lobe));
+        std::ptr::eq(self, other)
+            || is_seen_alike && self.scene.fingerprint() == other.scene.fingerprint()
+    }
+
+    /// What was done to the scene.
+    pub(crate) fn changes(&self) -> &Changes {
+        &self.changes
+    }
+
     /// The camera of a picture, and its settings in the scene's own units.
     pub(crate) fn camera(
         &self,
@@ -378,7 +417,8 @@ impl SceneData {
     }
 }
 
-/// Meshes and materials, prepared for ray tracing.
+/// Meshes and materials, prepared for ray tracing. Scenes can be pickled and compared: they are equal if everything that rays
+/// can hit is, and so are their cameras. A scene that was loaded is loaded again from its file.
 ///
 /// Parameters
 /// ----------
@@ -420,15 +460,14 @@ impl Scene {
         py: Python<'_>,
         name: String,
         mut description: SceneDescription,
-        material: Option<MaterialLike>,
-        ground: bool,
-        normalize: bool,
+        changes: Changes,
+        recipe: Recipe,
     ) -> PyResult<Self> {
         let mut lobes = Vec::new();
-        if normalize {
+        if changes.normalize {
             description.normalize();
         }
-        if let Some(material) = material {
+        if let Some(material) = &changes.material {
             let (bsdf, lobe) = material.bsdf(py)?;
             description.set_subject_material(bsdf);
             lobes.extend(lobe);
@@ -442,7 +481,7 @@ impl Scene {
                 "{name}: the scene is {extent:e} across; it must be from 1e-18 to 1e18"
             )));
         }
-        if ground {
+        if changes.ground {
             description.add_ground(up.vector());
         }
         let (camera, cameras) = (description.camera, description.cameras.clone());
@@ -450,8 +489,19 @@ impl Scene {
         let environment = description.environment.clone();
         let built = abandonable(py, move || scene::Scene::new(description))?;
         let scene = built.map_err(|error| bad_value(format!("{name}: {error}")))?;
-        let data =
-            SceneData { scene, name, camera, cameras, subject, offset, environment, up, lobes };
+        let data = SceneData {
+            scene,
+            name,
+            camera,
+            cameras,
+            subject,
+            offset,
+            environment,
+            up,
+            lobes,
+            changes,
+            recipe,
+        };
         Ok(Self { inner: Arc::new(data) })
     }
 }
@@ -474,6 +524,18 @@ impl Scene {
         name: &str,
     ) -> PyResult<Self> {
         let py = vertices.py();
+        let changes = Changes { material, ground, normalize };
+        // Copies, because arrays can be changed.
+        let given = [
+            ("normals", normals.as_ref().map(copied).transpose()?),
+            ("colors", colors.as_ref().map(copied).transpose()?),
+            ("uvs", uvs.as_ref().map(copied).transpose()?),
+            ("up", Some(PyString::new(py, up).into_any())),
+            ("name", Some(PyString::new(py, name).into_any())),
+        ];
+        let keywords = recipe::keywords(py, given.into_iter().chain(changes.keywords(py)))?;
+        let arguments = PyTuple::new(py, [copied(vertices)?, copied(faces)?])?;
+        let recipe = Recipe::new(None, &arguments, &keywords);
         let vertices = Floats::new("vertices", vertices)?;
         vertices.require_finite()?;
         let Ok((positions, &[n])) = vertices.rows::<3>() else {
@@ -521,7 +583,7 @@ impl Scene {
             up: Some(up_axis(up)?),
             ..SceneDescription::default()
         };
-        Self::build(py, name.to_owned(), description, material, ground, normalize)
+        Self::build(py, name.to_owned(), description, changes, recipe)
     }
 
     /// Load a mesh or a scene file: .ply, .obj, .stl, .off, .gltf, .glb or .toml.
@@ -575,6 +637,18 @@ impl Scene {
         if !at.is_finite() {
             return Err(bad_value(format!("at is {at}; it must be finite")));
         }
+        let changes = Changes { material, ground, normalize };
+        let text = |text: &str| PyString::new(py, text).into_any();
+        let given = [
+            ("scene", scene.as_deref().map(text)),
+            ("animation", animation.as_deref().map(text)),
+            ("at", Some(PyFloat::new(py, f64::from(at)).into_any())),
+            ("strict", Some(PyBool::new(py, strict).to_owned().into_any())),
+            ("up", up.map(text)),
+        ];
+        let keywords = recipe::keywords(py, given.into_iter().chain(changes.keywords(py)))?;
+        let arguments = PyTuple::new(py, [path.as_os_str()])?;
+        let recipe = Recipe::new(Some("load"), &arguments, &keywords);
         let animation = animation.map(|name| AnimationTime { name, seconds: at });
         let options = LoadOptions { strict, scene, animation, ..LoadOptions::default() };
         let loaded = parallel(py, || scene::load_with(&path, &options))?.map_err(to_python)?;
@@ -583,7 +657,7 @@ impl Scene {
         if let Some(up) = up {
             description.up = Some(up_axis(up)?);
         }
-        Self::build(py, path.display().to_string(), description, material, ground, normalize)
+        Self::build(py, path.display().to_string(), description, changes, recipe)
     }
 
     /// Create a built-in scene: 'statue', 'spheres', 'material-ball', 'room', 'sphere' or 'sphere-orthographic'.
@@ -606,7 +680,10 @@ impl Scene {
         let py = cls.py();
         let builtin = BuiltinScene::from_str(name).map_err(|e| from_source(&e))?;
         let description = parallel(py, || builtin.description())?;
-        Self::build(py, name.to_owned(), description, material, ground, normalize)
+        let changes = Changes { material, ground, normalize };
+        let keywords = recipe::keywords(py, changes.keywords(py))?;
+        let recipe = Recipe::new(Some("builtin"), &PyTuple::new(py, [name])?, &keywords);
+        Self::build(py, name.to_owned(), description, changes, recipe)
     }
 
     /// str: the name of the scene.
@@ -701,6 +778,29 @@ impl Scene {
     fn __repr__(&self) -> String {
         format!("<Scene {:?}: {} triangles>", self.inner.name, self.n_triangles())
     }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> PyResult<bool> {
+        let Ok(other) = other.cast::<Self>() else { return Ok(false) };
+        let (a, b) = (&*self.inner, &*other.get().inner);
+        parallel(other.py(), || a.is_same(b))
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.n_triangles().hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        slf.get().inner.recipe.reduce(&slf.get_type())
+    }
+}
+
+/// A copy of what is like an array.
+fn copied<'py>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    array.py().import("numpy")?.call_method1("array", (array,))
 }
 
 /// An attribute of each vertex, finite.

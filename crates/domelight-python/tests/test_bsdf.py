@@ -181,3 +181,9 @@ def test_texts_are_pickled():
     assert repr(material) == 'Material(Bsdf.parse("ggx:0.2:gold"))'
     with pytest.raises(TypeError, match="functions"):
         pickle.dumps(diffuse())
+
+
+def test_a_notebook_shows_the_lobe():
+    for bsdf in (dl.Bsdf.parse("ggx:0.2:gold"), dl.Material("ward:0.1"), diffuse()):
+        svg = bsdf._repr_svg_()
+        assert svg.startswith("<svg") and "viewer at" in svg and "NaN" not in svg

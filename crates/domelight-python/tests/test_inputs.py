@@ -1,5 +1,8 @@
 """Whatever comes in, what comes out is a result or an exception that says what is wrong."""
 
+import re
+from typing import get_args
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import domelight as dl
+from domelight import _names
 
 ENV = dl.Environment(np.random.default_rng(3).random((6, 12, 3)))
 BSDF = dl.Bsdf.parse("ggx:0.3")
@@ -197,3 +201,31 @@ def test_warnings_point_at_the_caller(tmp_path):
         dl.compare(SPHERE, ENV, {"none": lambda points: ([], np.empty((0, 3)), [])}, **few | {"budget": "rays:1"})
     assert {warning.filename for warning in caught} == {__file__}
     assert any("too few for a budget of rays" in str(warning.message) for warning in caught)
+
+
+def refusal(call):
+    with pytest.raises((ValueError, KeyError)) as error:
+        call()
+    return str(error.value)
+
+
+def test_the_names_for_type_checkers_are_those_of_the_engine():
+    tiny = {"spp": 1, "size": (2, 2)}
+    picture = np.ones((2, 2, 3))
+    for names, use in [
+        (_names.Filter, lambda name: dl.render(SPHERE, ENV, filter=name, **tiny)),
+        (_names.Sampler, lambda name: dl.render(SPHERE, ENV, sampler=name, **tiny)),
+        (_names.Passes, lambda name: dl.render(SPHERE, ENV, passes=name, **tiny)),
+        (_names.Curve, lambda name: dl.tone_map(picture, curve=name)),
+        (_names.Layer, lambda name: FILM[name]),
+        (_names.Up, lambda name: dl.Environment(ENV.map, up=name)),
+    ]:
+        known = get_args(names)
+        for name in known:
+            use(name)
+        # The message lists all that the engine knows.
+        message = refusal(lambda use=use: use("velvet"))
+        listed = set(re.findall(r"[a-z-]+", re.split(r"; |known are ", message, maxsplit=1)[1]))
+        assert set(known) <= listed, message
+        words = {"it", "must", "be", "or", "its", "layers", "are", "known", "the", "film", "and"}
+        assert listed - words == set(known), message

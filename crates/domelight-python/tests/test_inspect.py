@@ -1,5 +1,7 @@
 """The pixel X-ray."""
 
+import signal
+
 import numpy as np
 import pytest
 
@@ -68,3 +70,22 @@ def test_wrong_wishes_are_named(sphere, env, wrong, words):
 def test_a_miss_has_no_hemisphere(sphere, env):
     found = dl.inspect(sphere, env, pixel=(0, 0), size=(64, 64), strategies=["mis"])
     assert found.coverage == 0 and found.maps == {} and found.position is None
+
+
+def test_a_signal_ends_the_wait_for_an_inspection(env):
+    class Stopped(Exception):
+        pass
+
+    def stop(*_):
+        raise Stopped
+
+    before = signal.signal(signal.SIGALRM, stop)
+    scene = dl.Scene.builtin("statue")
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.1)
+        with pytest.raises(Stopped):
+            while True:
+                dl.inspect(scene, env, pixel=(32, 32), size=(64, 64), strategies=["product:8", "mis"], resolution=64)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)

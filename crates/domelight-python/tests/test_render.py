@@ -490,3 +490,23 @@ def test_films_say_how_many_samples_they_have(sphere, env):
     film = dl.render(sphere, env, "mis", spp=1 << 20, size=(8, 8), time=0.05)
     assert not film.complete
     assert f"{film['samples'].mean():.1f}".removesuffix(".0") + " of 1048576 samples, not complete" in repr(film)
+
+
+def test_scenes_are_pickled_copied_and_compared(tmp_path):
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    colors = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+    mesh = dl.Scene(corners, [[0, 1, 2]], colors=colors, up="z", name="a mesh")
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    loaded = dl.Scene.load(tmp_path / "a.obj", material=dl.Material("ggx:0.3"), normalize=True)
+    built = dl.Scene.builtin("spheres", ground=True, material="ward:0.1")
+    for scene in (mesh, loaded, built):
+        for other in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
+            assert other == scene and hash(other) == hash(scene)
+            assert repr(other) == repr(scene) and other.up == scene.up
+            films = [dl.render(s, spp=1, size=(8, 8), seed=3) for s in (scene, other)]
+            assert films[0] == films[1]
+    # What is changed later changes neither scene nor pickle.
+    before = pickle.dumps(mesh)
+    colors[0] = 1
+    assert pickle.loads(before) == mesh == pickle.loads(pickle.dumps(mesh))
+    assert built != dl.Scene.builtin("spheres", material="ward:0.1") and built != mesh and mesh != "a mesh"

@@ -105,3 +105,11 @@ def test_wrong_wishes_are_named(env, wrong, words):
 def test_black_maps_have_no_lights():
     with pytest.raises(ValueError, match="black"):
         dl.lights(dl.Environment(np.zeros((4, 8, 3))), 4)
+
+
+def test_a_notebook_shows_balls_in_the_light_of_the_rig():
+    env = dl.Environment.builtin("sky", rows=32)
+    for rig, balls in [(dl.lights(env, 4), 1), (dl.lights(env, None, sun=True), 3)]:
+        png = rig._repr_png_()
+        assert png.startswith(b"\x89PNG")
+        assert tuple(int.from_bytes(png[i : i + 4], "big") for i in (16, 20)) == (192 * balls, 192)

@@ -1,10 +1,13 @@
 //! Pictures and probes in files: round trips, every variant of every format, damaged files.
 #![cfg(feature = "io")]
 
+use domelight::environment::LatLongGrid;
 use domelight::environment::io::{
-    ProbeError, ProbeOptions, SanitizeReport, Window, load_probe, probe_from_picture, sanitize,
+    ProbeError, ProbeOptions, SanitizeReport, Window, load_probe, probe_from_bytes,
+    probe_from_picture, sanitize,
 };
 use domelight::environment::mapping::{CubeLayout, EnvmapKind, Mapping, from_lat_long};
+use domelight::math::{vec2, vec3};
 use domelight::picture::exr::{ExrLayers, text_attributes};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::picture::{
@@ -163,10 +166,9 @@ fn hdr_exposure_correction_and_line_ends() {
         "#?RADIANCE\npcomb a.hdr\na.hdr:\n\tEXPOSURE=2.0\n\tFORMAT=of a friend\n\n-Y 1 +X 1\n";
     let bytes = [header.as_bytes(), &[128, 128, 128, 129]].concat();
     assert_eq!(decode(&bytes).unwrap().image.pixels, [Rgb::WHITE]);
-    // Half of the sphere, as Radiance's angular fisheye sees it.
-    let fisheye = "#?RADIANCE\nVIEW= -vta -vd 0 0 1 -vh 180 -vv 180\n\n-Y 1 +X 1\n";
+    let fisheye = "#?RADIANCE\nVIEW= -vth -vd 0 0 1 -vh 180 -vv 180\n\n-Y 1 +X 1\n";
     let picture = decode(&[fisheye.as_bytes(), &[128, 128, 128, 129]].concat()).unwrap();
-    assert!(picture.warnings[0].contains("180"), "{:?}", picture.warnings);
+    assert!(picture.warnings[0].contains("an orthographic fisheye"), "{:?}", picture.warnings);
     // What cannot be meant is ignored.
     for odd in ["EXPOSURE=0", "EXPOSURE=nan", "COLORCORR=1 1", "PRIMARIES=1 0 1 0 1 0 1 0"] {
         let bytes = [format!("#?RADIANCE\n{odd}\n\n-Y 1 +X 1\n").as_bytes(), &[128, 128, 128, 129]]
@@ -179,6 +181,41 @@ fn hdr_exposure_correction_and_line_ends() {
     let bytes = format!("#?RADIANCE\n{bad}\n\n-Y 1 +X 1\nabcd");
     let message = decode(bytes.as_bytes()).unwrap_err().to_string();
     assert!(message.starts_with(&format!("test: header line 2: \"{bad}\" is not ")), "{message}");
+}
+
+/// Half of the sphere, as Radiance's angular fisheye sees it from below, with a lamp in the west.
+#[test]
+fn a_fisheye_of_the_upper_half_is_placed_by_its_view() {
+    let n = 64;
+    let mut bytes =
+        format!("#?RADIANCE\nVIEW= -vta -vd 0 0 1 -vu 0 1 0 -vh 180 -vv 180\n\n-Y {n} +X {n}\n")
+            .into_bytes();
+    let texel = |i: usize| {
+        // Half of the way from the zenith to the horizon, where west is on the right.
+        if i == n * n / 2 + 3 * n / 4 { [128, 128, 128, 137] } else { [128, 128, 128, 129] }
+    };
+    (0..n * n).for_each(|i| bytes.extend(texel(i)));
+    let probe = probe_from_bytes(&bytes, "zenith.hdr", &ProbeOptions::default()).unwrap();
+    assert_eq!((probe.warnings.as_slice(), probe.mapping), (&[][..], Mapping::Angular));
+    assert_eq!(probe.notes, ["a fisheye of 180 degrees (VIEW)"]);
+    let map = &probe.image;
+    let (width, height) = (map.width, map.height);
+    let grid = LatLongGrid::new(width, height);
+    let brightest =
+        (0..width * height).max_by(|&a, &b| map.pixels[a].r.total_cmp(&map.pixels[b].r));
+    let uv = |i: usize| {
+        vec2((i % width) as f32 + 0.5, (i / width) as f32 + 0.5) / vec2(width as f32, height as f32)
+    };
+    let lamp = Mapping::LatLong.direction(uv(brightest.unwrap())).unwrap();
+    let west = vec3(-0.5_f32.sqrt(), 0.5_f32.sqrt(), 0.0);
+    assert!(lamp.dot(west) > 0.999, "{lamp}");
+    // Light: the half sphere, and 255 of the lamp's texel, dω = 4 (π/2 / n)² sin 45° / (π/4).
+    let light: f64 =
+        (0..width * height).map(|i| f64::from(map.pixels[i].g) * grid.solid_angle(i / width)).sum();
+    let radians = std::f64::consts::PI / n as f64;
+    let expected = std::f64::consts::TAU + 255.0 * radians.powi(2) * 0.5_f64.sqrt() / 0.785;
+    assert!((light / expected - 1.0).abs() < 5e-3, "{light} instead of {expected}");
+    assert!(map.pixels[width * (height / 2 + 1)..].iter().all(|&texel| texel == Rgb::BLACK));
 }
 
 #[test]
@@ -638,7 +675,7 @@ fn exr_layers_are_written_and_found_again() {
     let alpha: Vec<f32> = (0..33 * 17).map(|i| i as f32 / 561.0).collect();
     let mut layers = ExrLayers::from_image(&color, Some(&alpha));
     layers.push_rgb("albedo", &albedo, None);
-    layers.push_xyz("normal", &vec![domelight::math::vec3(0.0, 0.5, 1.0); 561]);
+    layers.push_xyz("normal", &vec![vec3(0.0, 0.5, 1.0); 561]);
     layers.push_channel("depth", "Z", vec![3.5; 561]);
     layers.attributes = vec![("scene".into(), "Bühne".into()), ("seed".into(), "42".into())];
     layers.envmap = Some(EnvmapKind::LatLong);
@@ -870,7 +907,7 @@ fn probes_of_any_shape_load() {
     let layout = Mapping::Cube(CubeLayout::CrossVertical);
     let smooth = smooth(48, 64);
     let cross = RgbImage::from_fn(48, 64, |x, y| {
-        let uv = domelight::math::vec2((x as f32 + 0.5) / 48.0, (y as f32 + 0.5) / 64.0);
+        let uv = vec2((x as f32 + 0.5) / 48.0, (y as f32 + 0.5) / 64.0);
         if layout.direction(uv).is_some() { smooth.get(x, y) } else { Rgb::BLACK }
     });
     let cross = saved(&folder, "cross", &cross);

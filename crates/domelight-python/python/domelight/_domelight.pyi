@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterator
 from os import PathLike
-from typing import Any, Literal, SupportsIndex, TypeAlias, final
+from typing import Any, SupportsIndex, TypeAlias, final
 
 import numpy as np
 import numpy.typing as npt
 
+from ._names import Curve, Filter, Layer, Passes, Sampler, Up, Window
 from .metrics import Comparison
 from .strategies import Strategy
 from .testing import Chi2Report
@@ -14,7 +15,6 @@ from .testing import Chi2Report
 _Floats: TypeAlias = npt.NDArray[np.float32]
 _Counts: TypeAlias = npt.NDArray[np.uint32]
 _Path: TypeAlias = str | PathLike[str]
-_Up: TypeAlias = Literal["y", "z"]
 _MaterialLike: TypeAlias = Material | Bsdf | str
 
 __version__: str
@@ -35,7 +35,7 @@ class Environment:
         *,
         rotation: float = 0.0,
         scale: float = 1.0,
-        up: str = "y",
+        up: Up = "y",
         name: str = "array",
     ) -> Environment: ...
     @classmethod
@@ -45,8 +45,10 @@ class Environment:
         *,
         rotation: float = 0.0,
         scale: float = 1.0,
-        up: str = "y",
+        up: Up = "y",
         mapping: str | None = None,
+        faces: str | None = None,
+        window: Window | None = None,
         layer: str | None = None,
         strict: bool = False,
     ) -> Environment: ...
@@ -58,7 +60,7 @@ class Environment:
         rows: int = 1024,
         rotation: float = 0.0,
         scale: float = 1.0,
-        up: str = "y",
+        up: Up = "y",
     ) -> Environment: ...
     @classmethod
     def from_mitsuba(cls, source: Any) -> Environment: ...
@@ -72,7 +74,7 @@ class Environment:
     @property
     def rotation(self) -> float: ...
     @property
-    def up(self) -> _Up: ...
+    def up(self) -> Up: ...
     @property
     def name(self) -> str: ...
     @property
@@ -95,6 +97,7 @@ class Density:
 class Bsdf:
     @classmethod
     def parse(cls, text: str) -> Bsdf: ...
+    def _repr_svg_(self) -> str: ...
     @classmethod
     def custom(
         cls,
@@ -120,6 +123,7 @@ class Material:
     def __new__(cls, bsdf: _MaterialLike) -> Material: ...
     @classmethod
     def parse(cls, text: str) -> Material: ...
+    def _repr_svg_(self) -> str: ...
     @property
     def bsdf(self) -> Bsdf: ...
 
@@ -170,7 +174,7 @@ class Scene:
         material: _MaterialLike | None = None,
         ground: bool = False,
         normalize: bool = False,
-        up: str = "y",
+        up: Up = "y",
         name: str = "mesh",
     ) -> Scene: ...
     @classmethod
@@ -185,7 +189,7 @@ class Scene:
         animation: str | None = None,
         at: float = 0.0,
         strict: bool = False,
-        up: str | None = None,
+        up: Up | None = None,
     ) -> Scene: ...
     @classmethod
     def builtin(
@@ -205,7 +209,7 @@ class Scene:
     @property
     def offset(self) -> tuple[float, float, float]: ...
     @property
-    def up(self) -> _Up: ...
+    def up(self) -> Up: ...
     @property
     def cameras(self) -> list[str]: ...
     def camera(self, aspect: float = 1.0) -> Camera: ...
@@ -217,11 +221,11 @@ class Film:
     def color(self) -> _Floats: ...
     @property
     def alpha(self) -> _Floats: ...
-    def __getitem__(self, name: str, /) -> npt.NDArray[Any]: ...
+    def __getitem__(self, name: Layer, /) -> npt.NDArray[Any]: ...
     def __contains__(self, name: object, /) -> bool: ...
-    def __iter__(self) -> Iterator[str]: ...
+    def __iter__(self) -> Iterator[Layer]: ...
     @staticmethod
-    def keys() -> list[str]: ...
+    def keys() -> list[Layer]: ...
     @property
     def shape(self) -> tuple[int, int]: ...
     @property
@@ -243,13 +247,13 @@ class Film:
         path: _Path,
         *,
         exposure: float | None = None,
-        curve: str = "agx",
+        curve: Curve = "agx",
         bits: int = 8,
         denoise: bool = False,
     ) -> None: ...
     def denoise(self) -> _Floats: ...
     def to_png(
-        self, *, exposure: float | None = None, curve: str = "agx", bits: int = 8
+        self, *, exposure: float | None = None, curve: Curve = "agx", bits: int = 8
     ) -> bytes: ...
     def to_xarray(self) -> Any: ...
     def _repr_png_(self) -> bytes: ...
@@ -304,6 +308,7 @@ class Rig:
     def residual(self) -> Environment | None: ...
     def shading_error(self, environment: Environment) -> dict[str, float]: ...
     def save(self, path: _Path, *, format: str | None = None) -> None: ...
+    def _repr_png_(self) -> bytes: ...
 
 def _render(
     scene: Scene,
@@ -315,13 +320,13 @@ def _render(
     seed: int = 0,
     threads: int | None = None,
     camera: Camera | str | int | None = None,
-    filter: str = "gaussian",
-    sampler: str = "sobol",
+    filter: Filter = "gaussian",
+    sampler: Sampler = "sobol",
     hide_env: bool = False,
     adaptive: bool = True,
     target_error: float | None = None,
     tile_size: int | None = None,
-    passes: str = "efficient",
+    passes: Passes = "efficient",
     time: float | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Film: ...
@@ -335,13 +340,13 @@ def _progressive(
     seed: int = 0,
     threads: int | None = None,
     camera: Camera | str | int | None = None,
-    filter: str = "gaussian",
-    sampler: str = "sobol",
+    filter: Filter = "gaussian",
+    sampler: Sampler = "sobol",
     hide_env: bool = False,
     adaptive: bool = True,
     target_error: float | None = None,
     tile_size: int | None = None,
-    passes: str = "doubling",
+    passes: Passes = "doubling",
     progress: Callable[[float], object] | None = None,
 ) -> Progressive: ...
 def compare(
@@ -387,11 +392,11 @@ def write(
     picture: npt.ArrayLike,
     *,
     exposure: float | None = None,
-    curve: str = "agx",
+    curve: Curve = "agx",
     bits: int = 8,
 ) -> None: ...
 def tone_map(
-    picture: npt.ArrayLike, *, exposure: float | None = None, curve: str = "agx"
+    picture: npt.ArrayLike, *, exposure: float | None = None, curve: Curve = "agx"
 ) -> _Floats: ...
 def strategy_names() -> list[tuple[str, str]]: ...
 def compare_pictures(

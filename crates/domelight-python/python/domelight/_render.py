@@ -10,6 +10,7 @@ from ._progress import bar, callback
 
 if TYPE_CHECKING:
     from ._domelight import Camera, Environment, Film, Progressive, Scene
+    from ._names import Filter, Passes, Sampler
     from .strategies import Strategy
 
 
@@ -23,13 +24,13 @@ def render(
     seed: int = 0,
     threads: int | None = None,
     camera: Camera | str | int | None = None,
-    filter: str = "gaussian",
-    sampler: str = "sobol",
+    filter: Filter = "gaussian",
+    sampler: Sampler = "sobol",
     hide_env: bool = False,
     adaptive: bool = True,
     target_error: float | None = None,
     tile_size: int | None = None,
-    passes: str = "efficient",
+    passes: Passes = "efficient",
     time: float | None = None,
     progress: bool | Callable[[float], object] = False,
 ) -> Film:
@@ -69,13 +70,13 @@ def progressive(
     seed: int = 0,
     threads: int | None = None,
     camera: Camera | str | int | None = None,
-    filter: str = "gaussian",
-    sampler: str = "sobol",
+    filter: Filter = "gaussian",
+    sampler: Sampler = "sobol",
     hide_env: bool = False,
     adaptive: bool = True,
     target_error: float | None = None,
     tile_size: int | None = None,
-    passes: str = "doubling",
+    passes: Passes = "doubling",
     progress: bool | Callable[[float], object] = False,
 ) -> Progressive:
     return _domelight._progressive(

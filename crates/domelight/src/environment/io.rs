@@ -7,7 +7,7 @@
 pub use super::guess::Guess;
 pub use super::repair::{OVERFLOWED, SanitizeReport, sanitize};
 
-use super::mapping::{CubeFaces, Mapping, ShapeError, to_lat_long};
+use super::mapping::{CubeFaces, Fisheye, Mapping, ShapeError, fisheye_to_lat_long, to_lat_long};
 use super::repair::finite_light;
 use crate::memory;
 use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
@@ -163,7 +163,8 @@ pub fn probe_from_picture(
         warnings.push(format!("{file}: {guessed}"));
     }
     warnings.extend(choose_window(&mut picture, file, options)?);
-    let notes = picture.notes;
+    let mut notes = std::mem::take(&mut picture.notes);
+    let fisheye = fisheye(&picture, options);
     let mut image = picture.image;
     if matches!(picture.format, Format::Png | Format::Jpeg) {
         warnings.push(if picture.has_gain_map {
@@ -185,6 +186,7 @@ pub fn probe_from_picture(
     }
     let guess = match (options.mapping, options.faces) {
         (Some(mapping), _) => Guess { mapping, doubt: None },
+        _ if fisheye.is_some() => Guess { mapping: Mapping::Angular, doubt: None },
         (None, Some(_)) => {
             Guess { mapping: Mapping::guess(image.width, image.height, None), doubt: None }
         }
@@ -231,9 +233,23 @@ pub fn probe_from_picture(
     }
     let file_size = (image.width, image.height);
     let height = mapping.lat_long_height(image.width, image.height);
-    let image =
-        if mapping == Mapping::LatLong { image } else { to_lat_long(&image, mapping, height) };
+    let image = match (mapping, fisheye) {
+        (Mapping::LatLong, _) => image,
+        (_, Some(fisheye)) => {
+            notes.push(format!("a fisheye of {} degrees (VIEW)", fisheye.angle));
+            let height = (height as f64 * 360.0 / fisheye.angle).ceil() as usize;
+            fisheye_to_lat_long(&image, fisheye, height)
+        }
+        (_, None) => to_lat_long(&image, mapping, height),
+    };
     Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings, notes })
+}
+
+/// The view that the file states, unless somebody says what the map is or the view is what an angular map is anyway.
+fn fisheye(picture: &picture::Picture, options: &ProbeOptions) -> Option<Fisheye> {
+    let is_free = options.mapping.is_none() && options.faces.is_none();
+    let is_square = picture.image.width == picture.image.height;
+    picture.fisheye.filter(|&view| is_free && is_square && view != Fisheye::WHOLE)
 }
 
 /// Puts the picture into its display window, if that is the map. Returns a warning where nobody said which it is and

@@ -16,12 +16,14 @@
 mod convert;
 mod cube;
 mod faces;
+mod fisheye;
 mod overlap;
 
 pub(crate) use convert::from_lat_long_turned;
-pub use convert::{from_lat_long, to_lat_long};
+pub use convert::{fisheye_to_lat_long, from_lat_long, to_lat_long};
 pub use cube::CubeLayout;
 pub use faces::{CubeFaces, UnknownFaces};
+pub use fisheye::Fisheye;
 
 use crate::math::{PI, TAU, Vec2, Vec3, functions, sqr, vec2, vec3};
 use std::str::FromStr;

@@ -7,6 +7,7 @@
 //!
 //! EXPOSURE and COLORCORR are divided out (all of them, as they accumulate), and PRIMARIES other than Rec. 709's are
 //! converted. What cannot be meant, such as the EXPOSURE=0 of old versions of FreeImage, is ignored with a warning.
+//! A VIEW that is an equidistant fisheye says which directions the picture shows.
 //! XYZE is converted to Rec. 709 with the D65 matrix. In files of Radiance's `ra_xyze`, white is (1/3, 1/3), and EXPOSURE
 //! makes lumens of watts. Colors outside the gamut are clipped at zero, because a mantissa step in XYZ is enough to leave it.
 //!
@@ -16,6 +17,7 @@
 
 use super::primaries::{Primaries, to_light, xyz_of_white_to_rec709, xyz_to_rec709};
 use super::{Format, Picture, PictureErrorKind, allocate, checked_area};
+use crate::environment::mapping::Fisheye;
 use crate::math::functions;
 use crate::{Rgb, RgbImage};
 use rayon::prelude::*;
@@ -49,7 +51,8 @@ pub fn decode(bytes: &[u8]) -> Result<Picture, PictureErrorKind> {
         },
     );
     let picture = Picture::opaque(header.upright(pixels), Format::Hdr);
-    Ok(Picture { notes: header.notes(), warnings: header.warnings, ..picture })
+    let (notes, fisheye) = (header.notes(), header.fisheye);
+    Ok(Picture { notes, fisheye, warnings: header.warnings, ..picture })
 }
 
 /// How many texels the header promises.
@@ -82,6 +85,7 @@ struct Header {
     /// What the pixels were multiplied by, per channel.
     exposure: [f64; 3],
     primaries: Option<Primaries>,
+    fisheye: Option<Fisheye>,
     lines: usize,
     length: usize,
     /// The axis from scanline to scanline and the one along a scanline.
@@ -101,6 +105,7 @@ impl Header {
             warnings: Vec::new(),
             exposure: [1.0; 3],
             primaries: None,
+            fisheye: None,
             lines: 0,
             length: 0,
             slow: Axis { is_x: false, forward: true, size: 0 },
@@ -175,7 +180,12 @@ impl Header {
                     self.warnings.push(ignored());
                 }
             }
-            "VIEW" => self.warnings.extend(doubt_of_view(value)),
+            "VIEW" => match Fisheye::of_view(value) {
+                Ok(fisheye) => self.fisheye = fisheye,
+                Err(kind) => self.warnings.push(format!(
+                    "its VIEW is {kind}, which is not read: convert it to lat-long first"
+                )),
+            },
             _ => {}
         }
         Ok(())
@@ -229,17 +239,6 @@ impl Header {
             pixels[along(self.slow, slow) * self.length + along(self.fast, fast)]
         })
     }
-}
-
-/// A fisheye of less than the whole sphere, if that is the view of Radiance's `rpict`: no mapping is one.
-fn doubt_of_view(view: &str) -> Option<String> {
-    let words: Vec<&str> = view.split_ascii_whitespace().collect();
-    let is_fisheye = words.iter().any(|word| ["-vta", "-vth", "-vts"].contains(word));
-    let at = words.iter().position(|&word| word == "-vh")?;
-    let angle: f64 = words.get(at + 1)?.parse().ok()?;
-    (is_fisheye && angle < 360.0).then(|| {
-        format!("its VIEW is a fisheye of {angle} degrees, which is not read: convert it to lat-long first")
-    })
 }
 
 /// "-Y 512 +X 1024": the first axis goes from scanline to scanline; y grows upward, so that −Y runs downward.

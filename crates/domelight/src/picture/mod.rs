@@ -24,7 +24,7 @@ pub mod tone;
 pub use crate::files::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
 pub use error::{PictureError, PictureErrorKind};
 
-use crate::environment::mapping::EnvmapKind;
+use crate::environment::mapping::{EnvmapKind, Fisheye};
 use crate::memory;
 use crate::{Rgb, RgbImage};
 use std::fmt;
@@ -68,6 +68,8 @@ pub struct Picture {
     pub alpha: Option<Vec<f32>>,
     /// The value of OpenEXR's `envmap` attribute.
     pub envmap: Option<EnvmapKind>,
+    /// The view of a Radiance picture, if it is a fisheye.
+    pub fisheye: Option<Fisheye>,
     /// The position of the picture in OpenEXR's display window, if the two differ.
     pub window: Option<DataWindow>,
     /// Set if OpenEXR's layers do not show which of them is the picture, and none was requested.
@@ -104,12 +106,13 @@ impl fmt::Display for GuessedLayer {
 impl Picture {
     fn opaque(image: RgbImage, format: Format) -> Self {
         let (attributes, notes, warnings) = Default::default();
-        let (alpha, envmap, window, guessed_layer) = (None, None, None, None);
+        let (alpha, envmap, fisheye, window, guessed_layer) = (None, None, None, None, None);
         let has_gain_map = false;
         Self {
             image,
             alpha,
             envmap,
+            fisheye,
             window,
             guessed_layer,
             format,

@@ -4,6 +4,7 @@
 //! a texel is: a one-texel sun keeps its flux to about 10⁻⁶, and a constant map stays constant.
 
 use super::Mapping;
+use super::fisheye::Fisheye;
 use super::overlap::Overlap;
 use crate::color::Rgb;
 use crate::environment::LatLongGrid;
@@ -29,12 +30,36 @@ pub fn to_lat_long(image: &RgbImage, mapping: Mapping, height: usize) -> RgbImag
     if mapping == Mapping::LatLongExr && image.height == height && image.width.is_multiple_of(2) {
         return turned_by_half(image);
     }
-    let width = 2 * height;
-    let grid = LatLongGrid::new(width, height);
-    let mut sums = vec![Mean::default(); width * height];
+    let grid = LatLongGrid::new(2 * height, height);
+    let sums = sums(image, &grid, || Overlap::new(&grid, mapping, image.width, image.height));
+    let pixels = sums.iter().map(Mean::value).collect();
+    RgbImage::new(2 * height, height, pixels)
+}
+
+/// Converts a fisheye picture to a lat-long map of `2 · height` × `height` texels, black where the fisheye shows nothing.
+///
+/// # Panics
+/// If the picture has no texels or `height` is zero.
+pub fn fisheye_to_lat_long(image: &RgbImage, fisheye: Fisheye, height: usize) -> RgbImage {
+    assert!(image.width > 0 && image.height > 0 && height > 0, "an empty map");
+    let grid = LatLongGrid::new(2 * height, height);
+    let sums =
+        sums(image, &grid, || Overlap::of_fisheye(&grid, fisheye, image.width, image.height));
+    let texels = sums.into_iter().enumerate();
+    let pixels = texels.map(|(i, sum)| sum.value_of(grid.solid_angle(i / grid.width()))).collect();
+    RgbImage::new(2 * height, height, pixels)
+}
+
+/// Adds up what the texels of a picture share with those of a lat-long map.
+fn sums<'a>(
+    image: &RgbImage,
+    grid: &LatLongGrid,
+    overlap: impl Fn() -> Overlap<'a> + Sync,
+) -> Vec<Mean> {
+    let mut sums = vec![Mean::default(); grid.width() * grid.height()];
     for band in (0..image.height).step_by(BAND) {
         let rows = in_order(BAND.min(image.height - band), |i| {
-            let mut overlap = Overlap::new(&grid, mapping, image.width, image.height);
+            let mut overlap = overlap();
             let mut shares = Vec::new();
             for (x, &pixel) in image.row(band + i).iter().enumerate() {
                 overlap.texel(x, band + i);
@@ -46,8 +71,7 @@ pub fn to_lat_long(image: &RgbImage, mapping: Mapping, height: usize) -> RgbImag
             sums[j].add(pixel, share);
         }
     }
-    let pixels = sums.iter().map(Mean::value).collect();
-    RgbImage::new(width, height, pixels)
+    sums
 }
 
 /// Converts a lat-long map to a picture of `size` (width, height) in `mapping`, black where the picture shows no
@@ -110,6 +134,11 @@ impl Mean {
             *sum += f64::from(c) * weight;
         }
         self.weight += weight;
+    }
+
+    /// The mean over `solid_angle`, of which the rest is black.
+    fn value_of(self, solid_angle: f64) -> Rgb {
+        Self { weight: self.weight.max(solid_angle), ..self }.value()
     }
 
     /// Black where nothing weighs.

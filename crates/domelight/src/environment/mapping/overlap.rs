@@ -7,6 +7,7 @@
 //!
 //! Everything is in double precision: at 4096 rows, a single-precision coordinate is off by 10⁻⁴ of a texel.
 
+use super::fisheye::Fisheye;
 use super::{CubeLayout, Mapping};
 use crate::environment::LatLongGrid;
 use crate::math::functions;
@@ -22,6 +23,8 @@ pub(super) type Share = (usize, f64);
 pub(super) struct Overlap<'a> {
     grid: &'a LatLongGrid,
     mapping: Mapping,
+    /// The view of a fisheye picture, which is none of the mappings.
+    fisheye: Option<Fisheye>,
     /// The size of the picture whose texels are laid over the grid.
     width: usize,
     height: usize,
@@ -63,7 +66,17 @@ impl<'a> Overlap<'a> {
         height: usize,
     ) -> Self {
         let (outline, areas, shares) = (Vec::new(), Vec::new(), Vec::new());
-        Self { grid, mapping, width, height, turn: 0.0, outline, areas, shares }
+        Self { grid, mapping, fisheye: None, width, height, turn: 0.0, outline, areas, shares }
+    }
+
+    pub(super) fn of_fisheye(
+        grid: &'a LatLongGrid,
+        fisheye: Fisheye,
+        width: usize,
+        height: usize,
+    ) -> Self {
+        let angular = Self::new(grid, Mapping::Angular, width, height);
+        Self { fisheye: Some(fisheye), ..angular }
     }
 
     /// The overlap with the grid turned by a fraction of a full turn, counterclockwise as seen from above.
@@ -85,7 +98,11 @@ impl<'a> Overlap<'a> {
             Mapping::LatLongExr => self.rectangle(x, y, 0.5),
             Mapping::Angular | Mapping::MirrorBall | Mapping::Cube(_) | Mapping::Octahedral => {
                 let size = [self.width as f64, self.height as f64];
-                let Some(chart) = Chart::of(self.mapping, size, x, y) else { return };
+                let chart = match self.fisheye {
+                    Some(fisheye) => Chart::of_fisheye(fisheye, size, x, y),
+                    None => Chart::of(self.mapping, size, x, y),
+                };
+                let Some(chart) = chart else { return };
                 self.trace(&chart, size, [x as f64, y as f64]);
                 self.close();
             }
@@ -313,6 +330,7 @@ enum Chart {
     Angular,
     MirrorBall,
     Octahedral,
+    Fisheye(Fisheye),
     /// A face, and how many columns and rows of faces the picture has.
     Cube {
         forward: Direction,
@@ -337,6 +355,16 @@ impl Chart {
         })
     }
 
+    /// The chart of texel (x, y); none if it is outside the disc.
+    fn of_fisheye(fisheye: Fisheye, size: [f64; 2], x: usize, y: usize) -> Option<Self> {
+        let nearest = |i: usize, size: f64| {
+            let [low, high] = [i, i + 1].map(|i| 2.0 * i as f64 / size - 1.0);
+            if low * high < 0.0 { 0.0 } else { low.abs().min(high.abs()) }
+        };
+        let distance = functions::hypot(nearest(x, size[0]), nearest(y, size[1]));
+        (distance < 1.0).then_some(Self::Fisheye(fisheye))
+    }
+
     fn face(layout: CubeLayout, [u, v]: Point) -> Option<Self> {
         let (columns, rows) = layout.faces_across_and_down();
         let count = [columns as f64, rows as f64];
@@ -350,7 +378,8 @@ impl Chart {
     /// Whether a line begins inside the disc and ends outside.
     fn leaves_disc(&self, from: Point, to: Point) -> bool {
         let is_inside = |[u, v]: Point| functions::hypot(2.0 * u - 1.0, 2.0 * v - 1.0) < 1.0;
-        matches!(self, Self::Angular | Self::MirrorBall) && is_inside(from) != is_inside(to)
+        matches!(self, Self::Angular | Self::MirrorBall | Self::Fisheye(_))
+            && is_inside(from) != is_inside(to)
     }
 
     /// The unit direction at (u, v); outside a disc that of the disc's border.
@@ -363,6 +392,7 @@ impl Chart {
                 (2.0 * r * (1.0 - r * r).max(0.0).sqrt(), 1.0 - 2.0 * r * r)
             }),
             Self::Octahedral => octahedral([2.0 * u - 1.0, 2.0 * v - 1.0]),
+            Self::Fisheye(fisheye) => fisheye.direction(disc),
             Self::Cube { forward, right, up, cell, count } => {
                 let s = 2.0 * (u * count[0] - cell[0]) - 1.0;
                 let t = 1.0 - 2.0 * (v * count[1] - cell[1]);

@@ -1,0 +1,13 @@
+"""The names that arguments accept, for type checkers."""
+
+from typing import Literal, TypeAlias
+
+Filter: TypeAlias = Literal["box", "tent", "gaussian", "blackman-harris"]
+Sampler: TypeAlias = Literal["sobol", "independent"]
+Passes: TypeAlias = Literal["efficient", "doubling"]
+Curve: TypeAlias = Literal["standard", "reinhard", "aces", "agx", "neutral"]
+Layer: TypeAlias = Literal[
+    "color", "alpha", "unoccluded", "shadow", "albedo", "normal", "depth", "variance", "samples", "hits"
+]
+Up: TypeAlias = Literal["y", "z"]
+Window: TypeAlias = Literal["data", "display"]
