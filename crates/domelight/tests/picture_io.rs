@@ -626,6 +626,31 @@ fn exr_of_luminance_and_chroma() {
 }
 
 #[test]
+fn exr_of_luminance_and_chroma_at_every_texel() {
+    let image = smooth(8, 6);
+    let luminance = |c: &Rgb| c.luminance();
+    let of = |f: &dyn Fn(&Rgb) -> f32| image.pixels.iter().map(f).collect::<Vec<_>>();
+    let mut layers = ExrLayers::new(8, 6);
+    layers.push_channel("", "Y", of(&luminance));
+    layers.push_channel("", "RY", of(&|c| c.r / luminance(c) - 1.0));
+    layers.push_channel("", "BY", of(&|c| c.b / luminance(c) - 1.0));
+    let bytes = layers.encode().unwrap();
+    let read = decode(&bytes).unwrap().image;
+    for (a, b) in read.pixels.iter().zip(&image.pixels) {
+        assert!((*a - *b).map(f32::abs).max_component() < 1e-3, "{a:?} {b:?}");
+    }
+    // OpenEXR 3.4 has two more compressions.
+    let attribute = b"compression\0compression\0\x01\0\0\0";
+    let at = bytes.windows(attribute.len()).position(|window| window == attribute).unwrap();
+    for number in [10, 11] {
+        let mut bytes = bytes.clone();
+        bytes[at + attribute.len()] = number;
+        let message = kind(&bytes).to_string();
+        assert_eq!(message, "OpenEXR: files compressed by HTJ2K are not supported");
+    }
+}
+
+#[test]
 fn exr_of_one_channel_of_any_name_is_gray() {
     for name in ["R", "luminance", "Y"] {
         let mut layers = ExrLayers::new(4, 2);

@@ -1,4 +1,4 @@
-//! Luminance and chroma: OpenEXR's Y at every texel, RY and BY at every second texel of every second line.
+//! Luminance and chroma: OpenEXR's Y at every texel, RY and BY usually at every second texel of every second line.
 //!
 //! RY = (R − Y) / Y and BY = (B − Y) / Y, with Y from the weights of the file's primaries ("Technical Introduction to
 //! OpenEXR", Luminance/Chroma Images). Chroma is interpolated bilinearly; OpenEXR's own reader uses a wider filter.
@@ -34,7 +34,7 @@ struct Plane {
 }
 
 impl LuminanceChroma {
-    /// The file's part, if it is such a file: of one part, of scanlines, with subsampled channels.
+    /// The file's part, if it is such a file: of one part, of scanlines, without other colors.
     pub(super) fn of(bytes: &[u8]) -> Option<Self> {
         let mut cursor = Cursor::new(bytes);
         let mut meta = MetaData::read_from_buffered(&mut cursor, false).ok()?;
@@ -42,8 +42,8 @@ impl LuminanceChroma {
         let header = meta.headers.pop().filter(|_| is_one)?;
         let is_flat = !header.deep && header.blocks == BlockDescription::ScanLines;
         let has = |name: &str| header.channels.list.iter().any(|c| c.name.to_string() == name);
-        let is_subsampled = header.channels.list.iter().any(|c| sampling(c) != [1, 1]);
-        let fits = is_flat && is_subsampled && has("Y") && has("RY") && has("BY");
+        let has_colors = ["R", "G", "B"].into_iter().any(has);
+        let fits = is_flat && !has_colors && ["Y", "RY", "BY"].into_iter().all(has);
         fits.then_some(Self { header, table: cursor.position() as usize })
     }
 

@@ -125,12 +125,26 @@ pub(super) fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, PictureErrorKi
     if bytes.is_empty() {
         return Err(PictureErrorKind::NoBytes);
     }
-    let reader =
-        Reader::read_from_buffered(Cursor::new(bytes), false).map_err(PictureErrorKind::Exr)?;
+    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(|error| {
+        if compression(bytes).is_some_and(|number| HTJ2K.contains(&number)) {
+            return PictureErrorKind::ExrUnsupported("files compressed by HTJ2K");
+        }
+        PictureErrorKind::Exr(error)
+    })?;
     for header in reader.headers() {
         check_promises(header, bytes.len() as u64)?;
     }
     Ok(reader)
+}
+
+/// The numbers of OpenEXR 3.4's `HTJ2K256_COMPRESSION` and `HTJ2K32_COMPRESSION`.
+const HTJ2K: [u8; 2] = [10, 11];
+
+/// The number of the first part's compression.
+fn compression(bytes: &[u8]) -> Option<u8> {
+    const ATTRIBUTE: &[u8] = b"compression\0compression\0\x01\0\0\0";
+    let at = bytes.windows(ATTRIBUTE.len()).position(|window| window == ATTRIBUTE)?;
+    bytes.get(at + ATTRIBUTE.len()).copied()
 }
 
 /// Decompresses the blocks of a part's largest level, in the order of the file.
