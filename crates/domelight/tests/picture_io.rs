@@ -639,7 +639,14 @@ fn exr_of_luminance_and_chroma_at_every_texel() {
     for (a, b) in read.pixels.iter().zip(&image.pixels) {
         assert!((*a - *b).map(f32::abs).max_component() < 1e-3, "{a:?} {b:?}");
     }
-    // OpenEXR 3.4 has two more compressions.
+}
+
+/// OpenEXR 3.4 has two more compressions.
+#[test]
+fn exr_compressed_by_htj2k_is_refused_by_name() {
+    let mut layers = ExrLayers::new(4, 2);
+    layers.push_channel("", "Y", vec![2.5; 8]);
+    let bytes = layers.encode().unwrap();
     let attribute = b"compression\0compression\0\x01\0\0\0";
     let at = bytes.windows(attribute.len()).position(|window| window == attribute).unwrap();
     for number in [10, 11] {

@@ -66,7 +66,7 @@ impl LuminanceChroma {
         );
         if !is_read {
             return Err(PictureErrorKind::ExrUnsupported(
-                "luminance and chroma compressed by B44 or DWA",
+                "luminance and chroma compressed by B44, DWA or HTJ2K",
             ));
         }
         let blocks = self.blocks(bytes)?;

@@ -67,6 +67,9 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
     let reader = open(bytes)?;
     let selected = select(reader.headers(), layer)?;
     let header = &reader.headers()[selected.header];
+    if matches!(header.compression, Compression::HTJ2K32 | Compression::HTJ2K256) {
+        return Err(PictureErrorKind::ExrUnsupported("files compressed by HTJ2K"));
+    }
     let envmap = envmap(header);
     let chromaticities = header.shared_attributes.chromaticities.as_ref();
     let matrix = match selected.space {
@@ -125,26 +128,12 @@ pub(super) fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, PictureErrorKi
     if bytes.is_empty() {
         return Err(PictureErrorKind::NoBytes);
     }
-    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(|error| {
-        if compression(bytes).is_some_and(|number| HTJ2K.contains(&number)) {
-            return PictureErrorKind::ExrUnsupported("files compressed by HTJ2K");
-        }
-        PictureErrorKind::Exr(error)
-    })?;
+    let reader =
+        Reader::read_from_buffered(Cursor::new(bytes), false).map_err(PictureErrorKind::Exr)?;
     for header in reader.headers() {
         check_promises(header, bytes.len() as u64)?;
     }
     Ok(reader)
-}
-
-/// The numbers of OpenEXR 3.4's `HTJ2K256_COMPRESSION` and `HTJ2K32_COMPRESSION`.
-const HTJ2K: [u8; 2] = [10, 11];
-
-/// The number of the first part's compression.
-fn compression(bytes: &[u8]) -> Option<u8> {
-    const ATTRIBUTE: &[u8] = b"compression\0compression\0\x01\0\0\0";
-    let at = bytes.windows(ATTRIBUTE.len()).position(|window| window == ATTRIBUTE)?;
-    bytes.get(at + ATTRIBUTE.len()).copied()
 }
 
 /// Decompresses the blocks of a part's largest level, in the order of the file.
