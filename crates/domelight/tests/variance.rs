@@ -105,6 +105,54 @@ fn the_variance_layer_is_the_error_of_every_strategy() {
     println!("{n_near} of {n_cases} are within a fifth");
 }
 
+/// At silhouettes before a hidden background, and inside them: within a factor of 1.5, from 32 seeds.
+#[test]
+fn the_variance_layer_is_the_error_at_edges_and_inside() {
+    const SEEDS: u64 = 32;
+    let cases = [
+        (BuiltinScene::Sphere, BuiltinProbe::Constant),
+        (BuiltinScene::Sphere, BuiltinProbe::Sky),
+        (BuiltinScene::Statue, BuiltinProbe::Studio),
+    ];
+    let mut wrong = Vec::new();
+    for (builtin, probe) in cases {
+        let (scene, environment) = (Scene::builtin(builtin), environment(probe));
+        let of_seed = |seed| {
+            let settings = RenderSettings {
+                width: 80,
+                height: 80,
+                n_samples: 16,
+                seed,
+                background: Background::Hidden,
+                ..RenderSettings::default()
+            };
+            picture(&scene, &environment, "product:8", settings)
+        };
+        let pictures: Vec<Layers> = (0..SEEDS).into_par_iter().map(of_seed).collect();
+        let coverage = |i: usize| pictures.iter().map(|p| p.alpha[i]).sum::<f32>() / SEEDS as f32;
+        for (name, range) in [("edges", 0.01..0.99), ("inside", 0.999..1.1)] {
+            let pixels: Vec<usize> =
+                (0..80 * 80).filter(|&i| range.contains(&coverage(i))).collect();
+            let of = |image: &RgbImage| {
+                RgbImage::new(pixels.len(), 1, pixels.iter().map(|&i| image.pixels[i]).collect())
+            };
+            let chosen: Vec<Layers> = pictures
+                .iter()
+                .map(|p| {
+                    let mut chosen = Layers::new(pixels.len(), 1);
+                    (chosen.color, chosen.variance) = (of(&p.color), of(&p.variance));
+                    chosen
+                })
+                .collect();
+            let ratio = estimate_over_error(&chosen);
+            if !(1.0 / 1.5..1.5).contains(&ratio) {
+                wrong.push(format!("{} {}, {name}: {ratio:.2}", builtin.name(), probe.name()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 /// What the layer costs `product`: second sets of samples, which are no more than a fiftieth of all. Other pixels have the
 /// same samples with them and without, and strategies of one round have none.
 #[test]

@@ -58,12 +58,15 @@ fn of_square(image: &RgbImage) -> Guess {
     let margin = 3.0 / image.width as f32;
     let radius = |uv: Vec2| (2.0 * uv - Vec2::ONE).length();
     let corners = mean(image, |uv| radius(uv) > 1.0 + margin);
-    let shoulders = mean(image, |uv| {
+    let is_shoulder = |uv: Vec2| {
         let p = (2.0 * uv - Vec2::ONE).abs();
         p.x + p.y > 1.0 && radius(uv) < 1.0 - margin
-    });
-    let is_angular = corners == 0.0 && shoulders == 0.0 && mean(image, |_| true) == 0.0
-        || corners <= EMPTY * shoulders && shoulders > 0.0;
+    };
+    let is_angular = if mean(image, is_shoulder) > 0.0 {
+        corners == 0.0 || corners <= EMPTY * typical(image, is_shoulder)
+    } else {
+        mean(image, |_| true) == 0.0
+    };
     let mapping = if is_angular { Mapping::Angular } else { Mapping::Octahedral };
     let doubt = (!is_angular && has_equal_halves(image)).then(|| {
         "its halves look alike, as those of a stereo panorama, one eye over the other, which is not read: crop one of them"
@@ -90,7 +93,9 @@ fn has_equal_halves(image: &RgbImage) -> bool {
 fn of_cross(image: &RgbImage, layout: CubeLayout) -> Guess {
     let mapping = Mapping::Cube(layout);
     let is_face = |uv: Vec2| mapping.direction(uv).is_some();
-    if mean(image, |uv| !is_face(uv)) > EMPTY * mean(image, is_face) {
+    if mean(image, |uv| !is_face(uv)) > 0.0
+        && typical(image, |uv| !is_face(uv)) > EMPTY * typical(image, is_face)
+    {
         let doubt = format!(
             "it has the shape of a cross of cube faces, but light in its empty cells: read as lat-long; for a cross, say \
              {mapping}"
@@ -149,12 +154,12 @@ fn of_lat_long(image: &RgbImage) -> Option<String> {
         let in_half = vec2((2.0 * uv.x).fract(), uv.y);
         (2.0 * in_half - Vec2::ONE).length()
     };
-    let rim = mean(image, |uv| (0.9..1.0 - margin).contains(&radius(uv)));
+    let rim = typical(image, |uv| (0.9..1.0 - margin).contains(&radius(uv)));
     let is_empty = |top: f32| {
         let of_half = |uv: Vec2| radius(uv) > 1.0 + margin && (top..top + 0.5).contains(&uv.y);
         mean(image, of_half) <= EMPTY * EMPTY * rim
     };
-    (rim > 0.0 && is_empty(0.0) && is_empty(0.5)).then(|| {
+    (mean(image, |_| true) > 0.0 && is_empty(0.0) && is_empty(0.5)).then(|| {
         "it is black outside two discs, as two fisheye pictures of a camera with two lenses, which are not read: stitch them \
          first"
             .to_owned()
@@ -163,13 +168,23 @@ fn of_lat_long(image: &RgbImage) -> Option<String> {
 
 /// The mean luminance of the texels with their middles in a region; 0 if there are none.
 fn mean(image: &RgbImage, is_inside: impl Fn(Vec2) -> bool) -> f64 {
+    mean_of(image, is_inside, |texel| f64::from(texel.luminance().max(0.0)))
+}
+
+/// The geometric mean, which no sun brightens.
+fn typical(image: &RgbImage, is_inside: impl Fn(Vec2) -> bool) -> f64 {
+    functions::powf(2.0, mean_of(image, is_inside, log_luminance))
+}
+
+/// The mean of a function over the finite texels with their middles in a region; 0 if there are none.
+fn mean_of(image: &RgbImage, is_inside: impl Fn(Vec2) -> bool, f: impl Fn(Rgb) -> f64) -> f64 {
     let size = vec2(image.width as f32, image.height as f32);
     let (mut sum, mut count) = (0.0, 0u64);
     for y in 0..image.height {
-        for (x, texel) in image.row(y).iter().enumerate() {
-            let luminance = texel.luminance();
-            if is_inside(vec2(x as f32 + 0.5, y as f32 + 0.5) / size) && luminance.is_finite() {
-                sum += f64::from(luminance.max(0.0));
+        for (x, &texel) in image.row(y).iter().enumerate() {
+            let is_inside = is_inside(vec2(x as f32 + 0.5, y as f32 + 0.5) / size);
+            if is_inside && texel.luminance().is_finite() {
+                sum += f(texel);
                 count += 1;
             }
         }
@@ -262,6 +277,16 @@ mod tests {
             at((x as f32 + (y / 128) as f32) / 256.0, (y % 128) as f32 / 128.0)
         });
         assert_eq!(guess(&stereo), (Mapping::Octahedral, true));
+        // A sun makes nothing beside it empty.
+        let with_sun = |mut image: RgbImage, u: f32, v: f32| {
+            let (x, y) = (u * image.width as f32, v * image.height as f32);
+            image.pixels[y as usize * image.width + x as usize] = Rgb::splat(1e7);
+            image
+        };
+        assert_eq!(guess(&with_sun(photograph, 0.5, 0.5)), (Mapping::LatLong, true));
+        assert_eq!(guess(&with_sun(probe.clone(), 0.25, 0.03)), (Mapping::LatLong, false));
+        let octahedral = from_lat_long(probe, Mapping::Octahedral, (96, 96));
+        assert_eq!(guess(&with_sun(octahedral, 0.2, 0.2)), (Mapping::Octahedral, false));
         let fisheye = from_lat_long(probe, Mapping::Angular, (64, 64));
         let dual = RgbImage::from_fn(128, 64, |x, y| fisheye.get(x % 64, y));
         assert_eq!(guess(&dual), (Mapping::LatLong, true));

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::sums::PixelSums;
 use super::tiling::Window;
-use super::variance::VarianceSums;
+use super::variance::{Scale, VarianceSums};
 use crate::math::Vec3;
 use crate::{Rgb, RgbImage};
 
@@ -77,7 +77,7 @@ macro_rules! layers {
             }
 
             /// Sets pixel `i` from its sums.
-            fn set(&mut self, i: usize, sums: &PixelSums, variance_scale: f64) {
+            fn set(&mut self, i: usize, sums: &PixelSums, variance_scale: Scale) {
                 $({
                     let ($sums, $scale) = (sums, variance_scale);
                     LayerData::set(&mut self.$field, i, $value);
@@ -117,7 +117,8 @@ layers! {
     /// Mean distance from the camera plane over the samples that hit; 0 without hits.
     depth: Vec<f32> = "depth" { file: Some("depth"), channels: ["Z"], |sums, _scale| sums.depth() }
     /// Variance of each pixel's mean, at most `f32::MAX`: that of independent samples with the same sample variance,
-    /// scaled by the variance reduction measured over the whole picture.
+    /// scaled by the variance reduction measured over the whole picture; the part that comes from the coverage of a hidden
+    /// background has its own. Zero with a single sample, of which it is unknown.
     variance: RgbImage = "variance" {
         file: Some("variance"), channels: ["R", "G", "B"],
         |sums, scale| sums.variance(scale)
@@ -168,7 +169,7 @@ impl Layers {
         let inside = (start - from.y) * from.width..(end - from.y) * from.width;
         let pixels = pixels.get(inside.clone()).unwrap_or_default().iter().zip(inside);
         // Reuse the scale for neighbors with the same number of samples, because it costs a power.
-        let mut scale_of = (0, 1.0);
+        let mut scale_of = (0, variance.scale(0));
         for (p, i) in pixels.filter(|(p, _)| p.n_samples > 0) {
             let (x, y) = (from.x + i % from.width, from.y + i / from.width);
             assert!(window.contains(x, y), "pixel ({x}, {y}) outside {window}");

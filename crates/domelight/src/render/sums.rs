@@ -1,7 +1,7 @@
 //! The sums over the camera samples of a pixel, which make up a film and which a checkpoint stores bit by bit.
 
 use super::tiling::SampleSet;
-use super::variance::Contrast;
+use super::variance::{Contrast, Scale, usual_at_edges};
 use crate::Rgb;
 use crate::color::REGULARIZER;
 use crate::math::{Vec3, functions};
@@ -312,7 +312,13 @@ impl PixelSums {
         if self.n_second > 0 {
             let [first, second] = self.means_of_sets();
             let difference = std::array::from_fn(|c| first[c] - second[c]);
-            return Some(Contrast::Sets([independent, self.balance() * squares(difference)]));
+            let measured = self.balance() * squares(difference);
+            let coverage: f64 = self.coverage_variance().into_iter().sum();
+            if coverage > 0.0 {
+                let usual = coverage * usual_at_edges(self.n_samples - self.n_second);
+                return Some(Contrast::Edge([independent - coverage, coverage, usual, measured]));
+            }
+            return Some(Contrast::Sets([independent, measured]));
         }
         let [whole, half] = self.prefixes.map(|sum| sum.to_array().map(f64::from));
         let prefix = f64::from(1u32 << self.n_samples.ilog2());
@@ -366,9 +372,27 @@ impl PixelSums {
         })
     }
 
+    /// The part of s²/n that comes from the coverage of a hidden background: α(1 − α) m² / (n − 1), where m is the mean of
+    /// what covers it.
+    fn coverage_variance(&self) -> [f64; 3] {
+        let (n, alpha) = (f64::from(self.n_samples), f64::from(self.alpha()));
+        if n < 2.0 || alpha <= 0.0 || alpha >= 1.0 {
+            return [0.0; 3];
+        }
+        let independent = self.independent_variance();
+        std::array::from_fn(|c| {
+            let mean = self.color[c] / n;
+            ((1.0 - alpha) / alpha * mean * mean / (n - 1.0)).min(independent[c])
+        })
+    }
+
     /// The variance of the mean; `scale` is [`super::variance::VarianceSums::scale`] of its samples.
-    pub(super) fn variance(&self, scale: f64) -> Rgb {
-        Rgb::from(self.independent_variance().map(|v| narrowed(scale * v)))
+    pub(super) fn variance(&self, scale: Scale) -> Rgb {
+        let (independent, coverage) = (self.independent_variance(), self.coverage_variance());
+        let of_coverage = scale.coverage.unwrap_or(scale.inside);
+        Rgb::from(std::array::from_fn(|c| {
+            narrowed(scale.inside * (independent[c] - coverage[c]) + of_coverage * coverage[c])
+        }))
     }
 }
 
