@@ -54,7 +54,7 @@ export class Importance {
   }
 
   async draw(n: number, over: Pointed | null, isStill: () => boolean) {
-    const { size, lab } = this, of = sphere(size, 0), [x, y] = this.at, pixel = JSON.stringify({ x, y, width: size, height: size, camera: null });
+    const { size, lab } = this, of = sphere(this.stage.app, 0), [x, y] = this.at, pixel = JSON.stringify({ x, y, width: size, height: size, camera: null });
     if (this.known.pixel !== pixel) this.known = { pixel, layers: await lab.ask(of, "importance", pixel, "angular", 2 * TEXELS) };
     const layers = this.known.layers!, samples: Float32Array[] = [];
     for (const { strategy } of FUNCTIONS) samples.push((await lab.ask(of, "samples", pixel, strategy, "angular", n, 1)) as Float32Array);

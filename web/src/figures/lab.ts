@@ -21,9 +21,12 @@ export interface Situation {
   size: number;
 }
 
+/** The rows of a light probe, which has no more than that of the Picture panel. */
+export const rowsOf = (app: App) => Math.min(app.state.rows, 128);
+
 /** The lecture's sphere with a share of diffuse reflectance, in a nave. */
-export const sphere = (size: number, share: number): Situation =>
-  ({ scene: "sphere-orthographic", material: `phong:50:1:${share}`, ground: false, probe: "cathedral", rows: 128, rotate: 0, hidesEnvironment: true, size });
+export const sphere = (app: App, share: number): Situation =>
+  ({ scene: "sphere-orthographic", material: `phong:50:1:${share}`, ground: false, probe: "cathedral", rows: rowsOf(app), rotate: 0, hidesEnvironment: true, size: sizeOf(app) });
 
 /** The settings of the reference pictures, of which there are two. */
 const TRUTH = { strategy: "product:16", spp: 16 };

@@ -4,7 +4,7 @@ import { percentage, short } from "../dom";
 import { figureWidth, framed, isPresenting, plot } from "../plot";
 import type { Stage } from "../stage";
 import { clamp, generator } from "./curves";
-import { sizeOf } from "./lab";
+import { rowsOf, sizeOf } from "./lab";
 import { Pictures } from "./pictures";
 import { Plan, ROOM, WAYS, type Way } from "./plan";
 
@@ -17,7 +17,7 @@ const SAMPLES = 8, each = (rays: number) => Math.max(1, Math.round(rays / SAMPLE
 
 /** The built-in scene by the strategies, with as many rays each. */
 function pictured(stage: Stage): Pictures {
-  const of = { scene: "room", material: "", ground: false, probe: "sky", rows: 128, rotate: 125, hidesEnvironment: false, size: sizeOf(stage.app) };
+  const of = { scene: "room", material: "", ground: false, probe: "sky", rows: rowsOf(stage.app), rotate: 125, hidesEnvironment: false, size: sizeOf(stage.app) };
   const half = (n: number) => Math.max(1, Math.round(each(n) / 2)), strategies = [
     { name: "light", strategy: (n: number) => `environment:${each(n)}` }, { name: "lobe", strategy: (n: number) => `brdf:${each(n)}` },
     { name: "both", strategy: (n: number) => `mis:${half(n)}:${half(n)}` }, { name: "default, with the window", strategy: (n: number) => `product:${each(n)}` },

@@ -65,7 +65,7 @@ export const fourWays = (stage: Stage) => {
   };
   stage.draw(async () => {
     const share = diffuse(), timed = by() === "time", n = repeats();
-    const truth = await lab.truth(sphere(size, share)), keyOf = (name: string) => `${size} ${share} ${timed} ${name}`, runsOf = ({ name }: { name: string }) => known.get(keyOf(name)) ?? [];
+    const truth = await lab.truth(sphere(stage.app, share)), keyOf = (name: string) => `${size} ${share} ${timed} ${name}`, runsOf = ({ name }: { name: string }) => known.get(keyOf(name)) ?? [];
     // A figure that was left, or shows something else by now, renders no more.
     const isStill = () => stage.place.isConnected && share === diffuse() && timed === (by() === "time");
     // All ways have as many repeats at any time, so that the figure compares like with like.
@@ -73,7 +73,7 @@ export const fourWays = (stage: Stage) => {
       for (const way of WAYS) {
         const runs = runsOf(way);
         if (runs.length >= k || !isStill()) continue;
-        const picture = await (timed ? lab.render(sphere(size, share), way.few, 4096, EQUAL_TIME) : lab.render(sphere(size, share), way.strategy, 1));
+        const picture = await (timed ? lab.render(sphere(stage.app, share), way.few, 4096, EQUAL_TIME) : lab.render(sphere(stage.app, share), way.strategy, 1));
         known.set(keyOf(way.name), [...runs, { ...picture, error: errorOf(picture, truth) }]);
       }
       if (isStill()) show(WAYS.map((way) => runsOf(way).slice(0, k)), truth, timed, n);
