@@ -33,7 +33,9 @@ pub(crate) fn lobe_svg<E>(
             Datum::new(f64::from(angle), f64::from(value.luminance()))
         };
         let points = angles.iter().zip(&values).map(datum).collect();
-        series.push(Series::new(format!("viewer at {}°", -view), color, Join::Curve, points));
+        let name =
+            if view == 0.0 { "viewer at 0°".into() } else { format!("viewer at −{view}°") };
+        series.push(Series::new(name, color, Join::Curve, points));
     }
     let values = series.iter().flat_map(|s| s.points.iter().map(|p| p.y));
     let most = values.filter(|y| y.is_finite()).fold(0.0, f64::max);
