@@ -192,7 +192,9 @@ impl Job {
 
     /// The film of a renderer so far.
     pub(crate) fn film<S: Strategy>(&self, renderer: &Renderer<S>) -> Film {
-        let sums = renderer.whole_film();
+        // A coarse picture would call Python direction by direction, for minutes.
+        let is_quick = self.scene.lobes.is_empty();
+        let sums = if is_quick { renderer.whole_film() } else { renderer.film() };
         let exposure = *self.exposure.get_or_init(|| automatic_exposure_of(&sums.layers()));
         let (strategy, description) = match (&self.strategy, self.chosen.get()) {
             (Choice::Builtin(spec), None) | (_, Some(spec)) => {

@@ -1,7 +1,7 @@
 //! Interrupted, saved, divided and merged renders end with the bits of the uninterrupted one.
 #![cfg(feature = "io")]
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
 use domelight::RgbImage;
 use domelight::environment::builtin::BuiltinProbe;
@@ -11,10 +11,12 @@ use domelight::render::{
     Background, Checkpoint, CheckpointError, Counts, Film, FilmMismatch, Layers, Observer,
     RenderSettings, Renderer, Rendering, VarianceSums, Window, render,
 };
-use domelight::sampling::{Heuristic, Pcg32};
+use domelight::sampling::{Heuristic, Pcg32, Sampler};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, CameraSettings, Scene};
-use domelight::strategy::{LightTable, MultipleImportanceSampling, ProductSampling, Strategy};
+use domelight::strategy::{
+    Contributions, LightTable, MultipleImportanceSampling, ProductSampling, Strategy, TileShading,
+};
 
 type Mis<'a> = MultipleImportanceSampling<'a>;
 
@@ -145,6 +147,42 @@ fn an_interrupted_picture_has_no_holes() {
     assert!(renderer.film().layers().n_samples.contains(&0));
     renderer.run(&());
     assert_eq!(renderer.rendering().layers.color.pixels, expected.pixels);
+}
+
+/// However slow a strategy is, what fills its interrupted picture is quick.
+#[test]
+fn an_interrupted_picture_of_a_slow_strategy_is_filled_by_another() {
+    let test_scene = test_scene();
+    let settings = RenderSettings { n_samples: 80, ..settings() };
+    let slow = SlowStrategy { calls: AtomicU32::new(0) };
+    let mut renderer = renderer(&test_scene, &slow, &settings);
+    assert!(!renderer.run(&After::tiles(1)));
+    let calls = slow.calls.load(Ordering::Relaxed);
+    let layers = renderer.whole_film().layers();
+    assert!(layers.n_samples.iter().all(|&n| n > 0));
+    assert!(layers.color.pixels.iter().any(|pixel| pixel.luminance() > 0.0));
+    assert_eq!(slow.calls.load(Ordering::Relaxed), calls);
+}
+
+/// Black, and counts its calls.
+struct SlowStrategy {
+    calls: AtomicU32,
+}
+
+impl Strategy for SlowStrategy {
+    type Pass = ();
+    type Scratch = ();
+
+    fn n_rays(&self) -> u32 {
+        1
+    }
+
+    fn begin_pass(&self, _: Sampler, _: u32) {}
+
+    fn push(&self, (): &(), tile: &TileShading, _: u32, (): &mut (), out: &mut Contributions) {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        out.reset(tile.points.len());
+    }
 }
 
 /// Before no background tiles that see nothing keep no sums.

@@ -87,6 +87,9 @@ enum PassEnd {
     NothingLeft,
 }
 
+/// The strategy of coarse pictures, but for strategies that learn.
+const COARSE_STRATEGY: &str = "mis:1:1";
+
 impl<'a> Renderer<'a> {
     /// Renders with a built-in strategy. A pilot sets the parameters that were left open.
     ///
@@ -361,7 +364,8 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         film
     }
 
-    /// The film so far, with a coarse picture of one camera sample for 2 × 2 pixels where nothing was rendered. It shows
+    /// The film so far, with a coarse picture of one camera sample for 2 × 2 pixels where nothing was rendered, by `mis`
+    /// unless the strategy learns. It shows
     /// the whole picture of an interrupted render, which cannot continue from it. A part of a picture stays as it is.
     pub fn whole_film(&self) -> Film {
         let mut film = self.film();
@@ -389,7 +393,16 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let camera = self.context.camera.resized((width, height), (columns, rows));
         let filter = FilterSampler::new(settings.filter);
         let context = RenderContext { camera, settings, filter, ..self.context };
-        let coarse = Renderer::of_context(context, Held::Lent(&*self.strategy)).finish();
+        // Strategies that learn are made for few samples. One of another may take as long as a whole picture of `mis`.
+        let coarse = if self.strategy.n_rounds() > 1 {
+            Renderer::of_context(context, Held::Lent(&*self.strategy)).finish()
+        } else {
+            let mis = COARSE_STRATEGY.parse().expect("the text of a strategy");
+            let Ok(mis) = PreparedStrategy::new(mis, context.environment) else {
+                return Vec::new();
+            };
+            Renderer::of_context(context, Held::Own(Box::new(mis))).finish()
+        };
         let sums = coarse.get(coarse.window);
         let at = |x: usize, y: usize| sums[y * rows / height * columns + x * columns / width];
         let filled = |tile: &Tile| {
