@@ -159,7 +159,7 @@ fn of_lat_long(image: &RgbImage) -> Option<String> {
         let of_half = |uv: Vec2| radius(uv) > 1.0 + margin && (top..top + 0.5).contains(&uv.y);
         mean(image, of_half) <= EMPTY * EMPTY * rim
     };
-    (mean(image, |_| true) > 0.0 && is_empty(0.0) && is_empty(0.5)).then(|| {
+    (rim > 0.0 && is_empty(0.0) && is_empty(0.5)).then(|| {
         "it is black outside two discs, as two fisheye pictures of a camera with two lenses, which are not read: stitch them \
          first"
             .to_owned()
@@ -171,9 +171,13 @@ fn mean(image: &RgbImage, is_inside: impl Fn(Vec2) -> bool) -> f64 {
     mean_of(image, is_inside, |texel| f64::from(texel.luminance().max(0.0)))
 }
 
-/// The geometric mean, which no sun brightens.
+/// The geometric mean, which no sun brightens; 0 if all is black.
 fn typical(image: &RgbImage, is_inside: impl Fn(Vec2) -> bool) -> f64 {
-    functions::powf(2.0, mean_of(image, is_inside, log_luminance))
+    if mean(image, &is_inside) > 0.0 {
+        functions::powf(2.0, mean_of(image, is_inside, log_luminance))
+    } else {
+        0.0
+    }
 }
 
 /// The mean of a function over the finite texels with their middles in a region; 0 if there are none.
