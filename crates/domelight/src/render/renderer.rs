@@ -364,9 +364,9 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         film
     }
 
-    /// The film so far, with a coarse picture of one camera sample for 2 × 2 pixels where nothing was rendered, by `mis`
-    /// unless the strategy learns. It shows
-    /// the whole picture of an interrupted render, which cannot continue from it. A part of a picture stays as it is.
+    /// The film so far, with a coarse picture of one camera sample for 2 × 2 pixels where nothing was rendered: by the
+    /// render's own strategy if it learns, else by `mis`. It shows the whole picture of an interrupted render, which cannot
+    /// continue from it. A part of a picture stays as it is.
     pub fn whole_film(&self) -> Film {
         let mut film = self.film();
         self.coarse_tiles().iter().for_each(|tile| film.put(tile.window, &tile.sums()));
