@@ -174,17 +174,20 @@ impl<'a> Inspector<'a> {
         let [film, lens] = [Dimension::Film, Dimension::Lens].map(|d| sampler.set(d));
         let filter = FilterSampler::new(settings.filter);
         let see = |ray: &Ray, sample: u32| {
-            let Sight { hit, throughput } = scene.sight(ray, settings.seed, sample);
+            let Sight { hit, throughput, beyond } = scene.sight(ray, settings.seed, sample);
             if hit.is_some_and(|hit| scene.catches_shadows(&hit)) {
                 return Err(InspectError::ShadowCatcher { x, y });
             }
-            let known = match (&hit, settings.background) {
-                (Some(hit), _) => luminance(scene.emitted(hit) * throughput),
-                (None, Background::Hidden) => 0.0,
-                (None, Background::Shown) => {
-                    let le = environment.le_interpolated(ray.direction) * throughput;
+            let background = |share: Rgb| match settings.background {
+                Background::Hidden => 0.0,
+                Background::Shown => {
+                    let le = environment.le_interpolated(ray.direction) * share;
                     luminance(le) * environment.unit()
                 }
+            };
+            let known = match &hit {
+                Some(hit) => luminance(scene.emitted(hit) * throughput) + background(beyond),
+                None => background(throughput),
             };
             let point = hit.map(|hit| scene.shading_point(ray, &hit));
             Ok(CameraSample { point, known, throughput })

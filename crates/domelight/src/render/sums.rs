@@ -34,6 +34,17 @@ impl CameraSample {
             surface: self.surface,
         }
     }
+
+    /// Adds the fraction `beyond` of the background that is seen through the sample's surfaces.
+    pub(super) fn before(self, background: &Self, beyond: Rgb) -> Self {
+        Self {
+            color: self.color + background.color * beyond,
+            unoccluded: self.unoccluded + background.unoccluded * beyond,
+            // The surfaces cover the fraction of the background that they remove.
+            alpha: 1.0 - (1.0 - background.alpha) * beyond.mean(),
+            ..self
+        }
+    }
 }
 
 /// The surface that a camera sample saw.

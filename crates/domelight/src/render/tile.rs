@@ -471,8 +471,6 @@ impl Tile {
         let mut point = 0;
         let adaptive = batch.adaptive;
         let shown = context.settings.background == Background::Shown;
-        // Whether nothing is where no ray hits: neither background nor what transmitting surfaces take from it.
-        let is_empty = !shown && batch.sights.throughputs.is_empty();
         for i in 0..batch.camera_rays.len() {
             let CameraRays { samples, first } = batch.camera_rays[i].clone();
             if samples.is_empty() {
@@ -495,7 +493,7 @@ impl Tile {
                         point += 1;
                         batch.surface_sample(context, point - 1, ray, &hit, albedo, unit)
                     }
-                    Some(_) if is_empty => {
+                    Some((_, None)) if !shown => {
                         self.pixels[i].add_miss(set);
                         if adaptive {
                             sums.add(0.0, false);
@@ -509,8 +507,13 @@ impl Tile {
                         background_sample(ray.direction)
                     }
                 };
-                if let Some(&through) = ray.and_then(|ray| batch.sights.throughputs.get(ray)) {
-                    sample = sample.through(through);
+                if let Some(ray) = ray.filter(|_| !batch.sights.throughputs.is_empty()) {
+                    let Sights { throughputs, beyond, .. } = &batch.sights;
+                    sample = sample.through(throughputs[ray]);
+                    if beyond[ray] != Rgb::BLACK {
+                        let behind = background_sample(batch.rays[ray].direction);
+                        sample = sample.before(&behind, beyond[ray]);
+                    }
                 }
                 if adaptive {
                     let luminance = sample.color.luminance() + sample.unseen;

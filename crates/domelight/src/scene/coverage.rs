@@ -7,8 +7,10 @@
 //! number, so that the transmittances of several layers multiply. A covered point of a transmissive surface is hit with
 //! probability p = max(r/(r + t), ¼), where r ≥ 0.1 is about what it reflects and emits and t the luminance of T; the sample's
 //! weight is 1/p if the surface is hit, and T/(1 − p) if not. So a surface before even surroundings contributes the same
-//! to a sample that hits it as to one that passes. A shadow ray multiplies the transmittances of all surfaces along it,
-//! without noise, using the mean of T's channels at normal incidence.
+//! to a sample that hits it as to one that passes. Where the background is behind all of them, the ray sees it as well,
+//! through the product of their transmittances, and hits the last of them if no other: a pane before the sky has no noise
+//! of its own. A shadow ray multiplies the transmittances of all surfaces along it, without noise, using the mean of T's
+//! channels at normal incidence.
 //!
 //! A single-sided surface is invisible to a camera ray that comes from behind, so that a closed body is hit once. It
 //! casts a shadow from either side, but T also counts only once per body for light: where light reaches the front,
@@ -53,11 +55,45 @@ pub struct Sight {
     pub hit: Option<Hit>,
     /// A factor ≥ 0 on the radiance from there; 1 without transmission.
     pub throughput: Rgb,
+    /// The fraction of the background's radiance to add, in \[0, 1\]: what surfaces transmit that have nothing else
+    /// behind them.
+    pub beyond: Rgb,
 }
 
 impl Sight {
     fn clear(hit: Option<Hit>) -> Self {
-        Self { hit, throughput: Rgb::WHITE }
+        Self { hit, throughput: Rgb::WHITE, beyond: Rgb::BLACK }
+    }
+
+    /// What a ray sees that crosses transmissive surfaces, in order, before it ends at what is not transmissive.
+    fn through(crossings: &[Crossing], end: Option<Hit>) -> Self {
+        // The BVH may report a hit twice.
+        let each_once = crossings.chunk_by(|a, b| a.hit.triangle == b.hit.triangle);
+        let place = |hit: Hit| (hit.t, hit.triangle);
+        let is_nearer =
+            |crossing: &Crossing| end.is_none_or(|end| place(crossing.hit) < place(end));
+        let crossings = each_once.map(|same| same[0]).take_while(is_nearer);
+        let last = if end.is_none() { crossings.clone().last() } else { None };
+        let beyond = match last {
+            None => Rgb::BLACK,
+            Some(_) => crossings.clone().fold(Rgb::WHITE, |t, crossing| t * crossing.layer.through),
+        };
+        let mut throughput = Rgb::WHITE;
+        for Crossing { hit, layer, is_met, .. } in crossings {
+            let Layer { probability, coverage, through } = layer;
+            if last.is_some_and(|last| last.hit == hit) {
+                return Self { hit: Some(hit), throughput: throughput * coverage, beyond };
+            }
+            if is_met {
+                return Self {
+                    hit: Some(hit),
+                    throughput: throughput * (coverage / probability),
+                    beyond,
+                };
+            }
+            throughput = throughput * (through / (1.0 - probability).max(f32::MIN_POSITIVE));
+        }
+        Self { hit: end, throughput, beyond }
     }
 }
 
@@ -90,6 +126,8 @@ pub struct Sights {
     pub hits: Vec<Option<Hit>>,
     /// The factor ≥ 0 on the radiance from there, for each ray; empty if nothing transmits.
     pub throughputs: Vec<Rgb>,
+    /// The fraction of the background's radiance to add, for each ray; empty if nothing transmits.
+    pub beyond: Vec<Rgb>,
     /// The rays, ending at the closest opaque surface.
     rays: Vec<Ray>,
     /// The hits of these rays on surfaces that are not opaque.
@@ -107,28 +145,14 @@ const LEAST_REFLECTED: f32 = 0.25;
 /// What a surface at least counts as contributing, because what it reflects may be brighter than what is behind it.
 const LEAST_CONTRIBUTION: f32 = 0.1;
 
-/// How a camera ray interacts with a surface that is not opaque.
+/// How a camera ray meets a transmissive surface.
 #[derive(Clone, Copy, Debug)]
 struct Layer {
-    transmits: bool,
     /// The probability that a ray hits it.
     probability: f32,
-    /// Factors on the radiance of a ray that hits it, and of one that does not.
-    if_met: Rgb,
-    if_not: Rgb,
-}
-
-impl Layer {
-    /// The factors on the radiance of a ray that hits it, and of one that does not.
-    fn factor(&self, is_met: bool) -> Rgb {
-        if is_met { self.if_met } else { self.if_not }
-    }
-}
-
-impl Default for Layer {
-    fn default() -> Self {
-        Self { transmits: false, probability: 1.0, if_met: Rgb::WHITE, if_not: Rgb::WHITE }
-    }
+    coverage: f32,
+    /// The fraction of the light that passes.
+    through: Rgb,
 }
 
 /// A transmissive surface along a camera ray.
@@ -136,29 +160,19 @@ impl Default for Layer {
 struct Crossing {
     /// The index of the ray in its batch.
     ray: usize,
-    t: f32,
-    triangle: u32,
+    hit: Hit,
+    layer: Layer,
     is_met: bool,
-    /// The factor on the radiance of the ray, whether it hits the surface or passes.
-    factor: Rgb,
-}
-
-/// The product over a ray's crossings up to the surface that is seen. The BVH reports hits in any order, some of them
-/// twice, so they are sorted and duplicates are ignored.
-fn throughput(crossings: &[Crossing], seen: Option<Hit>) -> Rgb {
-    let seen = seen.map(|seen| (seen.t, seen.triangle));
-    let counts = |crossing: &&Crossing| {
-        let place = (crossing.t, crossing.triangle);
-        if crossing.is_met { Some(place) == seen } else { seen.is_none_or(|seen| place < seen) }
-    };
-    let each_once = crossings.chunk_by(|a, b| a.triangle == b.triangle).map(|same| &same[0]);
-    each_once.filter(counts).fold(Rgb::WHITE, |product, crossing| product * crossing.factor)
 }
 
 /// The order by ray, and by distance along each ray.
 fn sort(crossings: &mut [Crossing]) {
     crossings.sort_unstable_by(|a, b| {
-        a.ray.cmp(&b.ray).then(a.t.total_cmp(&b.t)).then(a.triangle.cmp(&b.triangle))
+        let (first, second) = (&a.hit, &b.hit);
+        a.ray
+            .cmp(&b.ray)
+            .then(first.t.total_cmp(&second.t))
+            .then(first.triangle.cmp(&second.triangle))
     });
 }
 
@@ -210,9 +224,10 @@ impl Scene {
     /// [`Scene::sight`] of many rays; fastest for neighboring rays, such as a tile's. Needs a key for each ray, or none if
     /// all surfaces are opaque. Overwrites `sights`.
     pub fn sights(&self, rays: &[Ray], keys: &[SightKey], sights: &mut Sights) {
-        let Sights { hits, throughputs, rays: nearer, met, crossings } = sights;
+        let Sights { hits, throughputs, beyond, rays: nearer, met, crossings } = sights;
         self.bvh.closest_hits(rays, hits);
         throughputs.clear();
+        beyond.clear();
         if self.has_single_sided {
             rays.iter().zip(&mut *hits).for_each(|(ray, hit)| *hit = self.facing(ray, *hit));
         }
@@ -240,14 +255,17 @@ impl Scene {
         if !self.transmits {
             return;
         }
-        // Multiply the transmittances along each ray.
+        // Select one of the transmissive surfaces before that, or what is behind them.
         sort(crossings);
         let mut rest = &crossings[..];
-        throughputs.extend(hits.iter().enumerate().map(|(i, hit)| {
+        for (i, hit) in hits.iter_mut().enumerate() {
             let (of_ray, others) = rest.split_at(rest.partition_point(|c| c.ray <= i));
             rest = others;
-            throughput(of_ray, *hit)
-        }));
+            let sight = Sight::through(of_ray, *hit);
+            *hit = sight.hit;
+            throughputs.push(sight.throughput);
+            beyond.push(sight.beyond);
+        }
     }
 
     /// The texture coordinates of up to [`TOGETHER`] hits of the second BVH.
@@ -277,11 +295,11 @@ impl Scene {
         let hit = met.map(|hit| partial.in_scene(&hit)).or(hit);
         let mut crossings = crossings.into_inner();
         sort(&mut crossings);
-        Sight { hit, throughput: throughput(&crossings, hit) }
+        Sight::through(&crossings, hit)
     }
 
-    /// Whether ray `i` of a batch hits a surface that is not opaque, at a hit with texture coordinates `uvs`. Passes
-    /// transmissive surfaces to `crossed`.
+    /// Whether ray `i` of a batch ends at a surface that is not opaque, at a hit with texture coordinates `uvs`. It passes
+    /// through transmissive surfaces, which go to `crossed`.
     #[inline]
     fn meets(
         &self,
@@ -295,13 +313,17 @@ impl Scene {
         if !self.faces(ray, hit) {
             return false;
         }
-        let layer = self.layer(ray, hit, uvs);
-        let is_met = key.meets(hit.triangle, layer.probability);
-        if layer.transmits {
-            let (&Hit { t, triangle, .. }, factor) = (hit, layer.factor(is_met));
-            crossed(Crossing { ray: i, t, triangle, is_met, factor });
+        let (part, triangle) = self.locate(hit.triangle);
+        let coverage = self.opacity_at(part, triangle, hit, uvs);
+        if !self.materials[part.material].transmits() {
+            return key.meets(hit.triangle, coverage);
         }
-        is_met
+        if coverage > 0.0 {
+            let layer = self.layer(ray, hit, coverage);
+            let is_met = key.meets(hit.triangle, layer.probability);
+            crossed(Crossing { ray: i, hit: *hit, layer, is_met });
+        }
+        false
     }
 
     /// The closest hit of what is opaque and seen from the ray's side, given the closest of what is opaque.
@@ -313,26 +335,17 @@ impl Scene {
         }
     }
 
-    /// How a camera ray meets a surface that is not opaque.
-    fn layer(&self, ray: &Ray, hit: &Hit, uvs: &Uvs) -> Layer {
+    /// How a camera ray meets a transmissive surface of some coverage.
+    fn layer(&self, ray: &Ray, hit: &Hit, coverage: f32) -> Layer {
         let (part, triangle) = self.locate(hit.triangle);
-        let coverage = self.opacity_at(part, triangle, hit, uvs);
-        let material = &self.materials[part.material];
-        if !material.transmits() {
-            return Layer { probability: coverage, ..Layer::default() };
-        }
         let normal = part.mesh.area_normal(triangle).normalize_or_zero();
         let cos_theta = normal.dot(ray.direction.normalize()).abs();
         let LightShares { transmitted, reflected } = self.shares(part, triangle, hit, cos_theta);
         let through = Rgb::splat(1.0 - coverage) + transmitted * coverage;
-        let emitted = material.emission.as_ref().map_or(0.0, |e| e.radiance.luminance());
+        let emission = self.materials[part.material].emission.as_ref();
+        let emitted = emission.map_or(0.0, |e| e.radiance.luminance());
         let probability = meeting_probability(reflected + emitted, coverage, through);
-        Layer {
-            transmits: true,
-            probability,
-            if_met: Rgb::splat(if probability > 0.0 { coverage / probability } else { 0.0 }),
-            if_not: through / (1.0 - probability).max(f32::MIN_POSITIVE),
-        }
+        Layer { probability, coverage, through }
     }
 
     /// What becomes of light at a hit, where the surface exists.
