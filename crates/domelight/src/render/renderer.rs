@@ -261,7 +261,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let complete = tiles
             .par_iter_mut()
             .filter(|tile| behind(tile))
-            .map_init(Scratch::<S>::default, |scratch, tile| {
+            .map_init(Box::<Scratch<S>>::default, |scratch, tile| {
                 if observer.canceled() {
                     return false;
                 }

@@ -157,7 +157,7 @@ pub(super) fn scout<S: Strategy>(
     let scouts = |n: usize, pass: &Pass<S>| -> Vec<Scout> {
         spread(width, height, SCOUT_WINDOW, n)
             .into_par_iter()
-            .map_init(Scratch::<S>::default, |scratch, window| {
+            .map_init(Box::<Scratch<S>>::default, |scratch, window| {
                 Tile::new(window).render(context, strategy, pass, scratch, &());
                 Scout::of_window(scratch, second_sets).collect::<Vec<_>>()
             })

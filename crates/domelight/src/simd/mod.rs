@@ -112,7 +112,7 @@ pub(crate) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) ->
         }
         _ => {}
     }
-    kernel.run(scalar::Scalar)
+    scalar::Scalar.run(kernel)
 }
 
 /// An instruction set. Any value of this type, and any vector created with it, proves that the processor has the

@@ -4,7 +4,9 @@ use std::array::from_fn;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 use super::pair::Pair;
-use super::{LANES, LaneMask, Lanes, Simd, SimdBitSets, SimdF32x8, SimdFloat, SimdI32x8, last_of};
+use super::{
+    Kernel, LANES, LaneMask, Lanes, Simd, SimdBitSets, SimdF32x8, SimdFloat, SimdI32x8, last_of,
+};
 
 #[derive(Clone, Copy)]
 pub(crate) struct Scalar;
@@ -20,6 +22,15 @@ pub(crate) struct Mask8([bool; 8]);
 
 #[derive(Clone, Copy)]
 pub(crate) struct BitSets8([u32; 8]);
+
+impl Scalar {
+    /// Runs the kernel in a function of its own: without optimization, its variables would fill the stack of every
+    /// instruction set's caller.
+    #[inline]
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        kernel.run(self)
+    }
+}
 
 impl Simd for Scalar {
     type F32x8 = F32x8;
