@@ -1,6 +1,6 @@
 //! Comparisons of strategies at equal samples, rays or time.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 use std::sync::{Mutex, PoisonError};
 
@@ -21,7 +21,6 @@ use crate::scene::{CameraLike, Scene};
 /// Ends the work on a signal or after a Python function has raised, and keeps the warnings.
 struct PythonHost<'a> {
     job: &'a Job,
-    cancel: &'a AtomicBool,
     warnings: Mutex<Vec<String>>,
     /// The finished fraction, in [0, 1], and the current step.
     state: Mutex<(f64, String)>,
@@ -53,7 +52,8 @@ impl Host for PythonHost<'_> {
     }
 
     fn canceled(&self) -> bool {
-        self.cancel.load(Ordering::Relaxed) || self.job.failure().has_failed()
+        let failure = self.job.failure();
+        failure.cancel().load(Ordering::Relaxed) || failure.has_failed()
     }
 }
 
@@ -106,10 +106,8 @@ pub(crate) fn compare<'py>(
         .map(|(name, strategy)| Ok((name, choose(&strategy, 1, lobes)?)))
         .collect::<PyResult<Vec<_>>>()?;
     let report = &job.scene_report();
-    let cancel = &AtomicBool::new(false);
     let host = &PythonHost {
         job,
-        cancel,
         warnings: Mutex::new(Vec::new()),
         state: Mutex::new((0.0, String::new())),
     };
@@ -149,7 +147,7 @@ pub(crate) fn compare<'py>(
                 // The receiver is still waiting.
                 let _ = sender.send(compared);
             });
-            wait(&results, cancel, &report_progress)
+            wait(&results, job.failure().cancel(), &report_progress)
         })
     })?;
     if let Some(error) = job.failure().take().or(stopped) {

@@ -11,6 +11,8 @@ use pyo3::prelude::*;
 pub(crate) struct Failure {
     failed: AtomicBool,
     error: Mutex<Option<PyErr>>,
+    canceled: AtomicBool,
+    cut_short: AtomicBool,
 }
 
 thread_local! {
@@ -37,18 +39,38 @@ impl Failure {
         self.failed.load(Ordering::Relaxed)
     }
 
+    /// Ends the call: the engine stops soon, and Python functions are no longer called.
+    pub(crate) fn cancel(&self) -> &AtomicBool {
+        &self.canceled
+    }
+
+    /// Whether a Python function was not called because the call was canceled.
+    pub(crate) fn has_cut_short(&self) -> bool {
+        self.cut_short.load(Ordering::Relaxed)
+    }
+
+    /// Begins a call that continues a canceled one.
+    pub(crate) fn resume(&self) {
+        self.canceled.store(false, Ordering::Relaxed);
+        self.cut_short.store(false, Ordering::Relaxed);
+    }
+
     /// The exception, once.
     pub(crate) fn take(&self) -> Option<PyErr> {
         self.error.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
 
-/// Calls Python for the engine's current call. Returns `None` if the call raises, or if one has raised before, and keeps
-/// the exception.
+/// Calls Python for the engine's current call. Returns `None` if the function raises, whose exception it keeps, if one has
+/// raised before, or if the call is canceled.
 pub(crate) fn or_report<T>(call: impl FnOnce(Python<'_>) -> PyResult<T>) -> Option<T> {
     let failure = OF_THREAD.with_borrow(Clone::clone);
     let failure = failure.expect("Python functions are called in a job's pool");
     if failure.has_failed() {
+        return None;
+    }
+    if failure.canceled.load(Ordering::Relaxed) {
+        failure.cut_short.store(true, Ordering::Relaxed);
         return None;
     }
     Python::attach(call).map_err(|error| failure.report(error)).ok()

@@ -1,6 +1,6 @@
 //! Progressive renders: a film after each pass.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -26,7 +26,6 @@ type Step = PyResult<Option<Film>>;
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Progressive {
     job: Arc<Job>,
-    cancel: Arc<AtomicBool>,
     /// Camera samples so far.
     done: Arc<AtomicU64>,
     progress: Option<Py<PyAny>>,
@@ -42,7 +41,6 @@ pub(crate) struct Progressive {
 /// Answers each request with the next pass.
 struct Steps<'a> {
     job: &'a Job,
-    cancel: &'a AtomicBool,
     done: &'a AtomicU64,
     questions: Receiver<()>,
     answers: Sender<Step>,
@@ -52,8 +50,8 @@ impl Visitor for Steps<'_> {
     type Output = ();
 
     fn visit<S: Strategy>(self, mut renderer: Renderer<S>) {
-        let Self { job, cancel, done, questions, answers } = self;
-        let watch = Watch { job, cancel, done, end: None };
+        let Self { job, done, questions, answers } = self;
+        let watch = Watch { job, done, end: None };
         while questions.recv().is_ok() {
             if renderer.is_complete() {
                 let _ = answers.send(Ok(None));
@@ -97,10 +95,12 @@ impl Progressive {
         }
         let (result, stopped) = py.detach(|| {
             let answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
-            self.cancel.store(false, Ordering::Relaxed);
+            self.job.failure().resume();
             // If the thread has ended, its answer will be missing.
             let _ = self.questions.send(());
-            wait(&answers, &self.cancel, &|py| self.report(py, self.job.share(&self.done)))
+            wait(&answers, self.job.failure().cancel(), &|py| {
+                self.report(py, self.job.share(&self.done))
+            })
         })?;
         // Any error ends the render.
         let failure = self.job.failure();
@@ -191,13 +191,13 @@ pub(crate) fn progressive<'py>(
         passes,
     };
     let job = Arc::new(Job::new(py, scene.get(), env, keywords)?);
-    let (cancel, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
+    let done = Arc::new(AtomicU64::new(0));
     let (ask, questions) = mpsc::channel();
     let (answers, answered) = mpsc::channel();
-    let on_thread = (job.clone(), cancel.clone(), done.clone());
+    let on_thread = (job.clone(), done.clone());
     let body = move || {
-        let (job, cancel, done) = (&*on_thread.0, &*on_thread.1, &*on_thread.2);
-        let steps = Steps { job, cancel, done, questions, answers: answers.clone() };
+        let (job, done) = (&*on_thread.0, &*on_thread.1);
+        let steps = Steps { job, done, questions, answers: answers.clone() };
         let served =
             job.pool().and_then(|pool| caught(|| pool.install(|| job.with_renderer(steps)))?);
         if let Err(error) = served {
@@ -208,5 +208,5 @@ pub(crate) fn progressive<'py>(
     started.map_err(|e| PyRuntimeError::new_err(format!("cannot start a thread: {e}")))?;
     let (answers, last) = (Mutex::new(answered), Mutex::new(None));
     let process = std::process::id();
-    Ok(Progressive { job, cancel, done, progress, questions: ask, answers, last, process })
+    Ok(Progressive { job, done, progress, questions: ask, answers, last, process })
 }

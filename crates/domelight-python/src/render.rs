@@ -1,6 +1,6 @@
 //! Rendering: settings from Python, a render that signals can end, and its film.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
@@ -297,6 +297,11 @@ impl Job {
             && kind != Some(StrategyKind::Product)
     }
 
+    /// Whether the strategy or a BSDF is a Python function.
+    pub(crate) fn calls_python(&self) -> bool {
+        !self.scene.lobes.is_empty() || matches!(self.strategy, Choice::Python(_))
+    }
+
     /// What has failed, if anything.
     pub(crate) fn failure(&self) -> &Failure {
         &self.failure
@@ -370,7 +375,6 @@ pub(crate) trait Visitor {
 /// Ends a render that is canceled, fails or runs out of time, and counts its samples.
 pub(crate) struct Watch<'a> {
     pub(crate) job: &'a Job,
-    pub(crate) cancel: &'a AtomicBool,
     pub(crate) done: &'a AtomicU64,
     /// The end of the time limit; started tiles are finished.
     pub(crate) end: Option<Instant>,
@@ -383,9 +387,18 @@ impl Observer for Watch<'_> {
 
     fn canceled(&self) -> bool {
         let is_late = || self.end.is_some_and(|end| Instant::now() >= end);
-        self.cancel.load(Ordering::Relaxed)
-            || self.job.failure().has_failed()
+        let failure = self.job.failure();
+        failure.cancel().load(Ordering::Relaxed)
+            || failure.has_failed()
             || (self.done.load(Ordering::Relaxed) > 0 && is_late())
+    }
+
+    fn may_cut_short(&self) -> bool {
+        self.job.calls_python()
+    }
+
+    fn has_cut_short(&self) -> bool {
+        self.job.failure().has_cut_short()
     }
 }
 
@@ -533,7 +546,7 @@ pub(crate) fn render<'py>(
         passes,
     };
     let job = &Job::new(py, scene.get(), env, keywords)?;
-    let (cancel, done) = (&AtomicBool::new(false), &AtomicU64::new(0));
+    let done = &AtomicU64::new(0);
     let report = |py: Python<'_>| match &progress {
         Some(progress) => progress.bind(py).call1((job.share(done),)).map(drop),
         None => Ok(()),
@@ -543,14 +556,14 @@ pub(crate) fn render<'py>(
             let (sender, results) = mpsc::channel();
             scope.spawn(move || {
                 let rendered = job.pool().and_then(|pool| {
-                    let watch = Watch { job, cancel, done, end: None };
+                    let watch = Watch { job, done, end: None };
                     let visitor = ToTheEnd { job, watch, time };
                     caught(|| pool.install(|| job.with_renderer(visitor)))?
                 });
                 // The receiver is still waiting.
                 let _ = sender.send(rendered);
             });
-            wait(&results, cancel, &report)
+            wait(&results, job.failure().cancel(), &report)
         })
     })?;
     if let Some(error) = job.failure().take() {

@@ -2,6 +2,7 @@
 
 import copy
 import importlib.util
+import itertools
 import multiprocessing
 import os
 import pickle
@@ -310,18 +311,44 @@ def test_interruption_keeps_what_was_done(sphere, env, strategy):
 
 
 @pytest.mark.timing
-@pytest.mark.parametrize("strategy", ["product", "mis", "sir:8/800", "python"])
+@pytest.mark.parametrize("strategy", ["product", "mis", "sir:8/800", "python", "sir of one's own BSDF"])
 def test_interruption_is_quick(strategy):
     """Within two tenths of a second, of the default size."""
     env = dl.Environment.builtin("sky")
-    chosen = dl.strategies.Environment(env) if strategy == "python" else strategy
-    scene = dl.Scene.builtin("statue")
+    chosen = dl.strategies.Environment(env) if strategy == "python" else strategy.split(" of ")[0]
+    own = dl.Bsdf.custom(lambda wo, wi: np.float32(0.5 / np.pi) * wi[:, 2], albedo=0.5, max_eval=0.5 / np.pi)
+    scene = dl.Scene.builtin("statue", material=own if "own" in strategy else None)
     at = interrupt_after(1.5)
     with pytest.raises(dl.RenderInterrupted):
         dl.render(scene, env, chosen, spp=1 << 20)
     seconds = time.monotonic() - at
     print(f"\n{strategy}: {seconds:.3f} s from the interrupt to its exception")
     assert seconds < 0.2
+
+
+@pytest.mark.parametrize("strategy", ["mis", "sir:2/8", "product"])
+def test_tiles_that_an_interruption_cuts_short_are_rendered_again(env, strategy):
+    """Functions of running tiles are no longer called after Ctrl-C, which leaves no trace in the film."""
+    calls = itertools.count()
+
+    def eval(wo, wi):
+        if next(calls) in (3, 12):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.1)
+        return np.float32(0.5 / np.pi) * wi[:, 2]
+
+    own = dl.Bsdf.custom(eval, albedo=0.5, max_eval=0.5 / np.pi)
+    scene = dl.Scene.builtin("sphere", material=own)
+    settings = dict(spp=4, size=(40, 40), tile_size=16)
+    steps = dl.progressive(scene, env, strategy, **settings)
+    n_interrupted, film = 0, None
+    while film is None or not film.complete:
+        try:
+            film = next(steps)
+        except dl.RenderInterrupted:
+            n_interrupted += 1
+    assert n_interrupted > 0
+    assert film == dl.render(scene, env, strategy, passes="doubling", **settings)
 
 
 def test_progressive_goes_on_after_an_interruption(sphere, env):

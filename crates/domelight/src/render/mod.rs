@@ -191,6 +191,16 @@ pub trait Observer: Sync {
     fn canceled(&self) -> bool {
         false
     }
+
+    /// Whether functions of the caller, such as custom BSDFs, may be cut short. It costs a copy of each tile.
+    fn may_cut_short(&self) -> bool {
+        false
+    }
+
+    /// Whether they have been, so that running tiles keep the samples that they had.
+    fn has_cut_short(&self) -> bool {
+        false
+    }
 }
 
 /// An observer that does nothing.

@@ -254,6 +254,9 @@ impl<'a, S: Strategy> Renderer<'a, S> {
             Some((of, pass)) if of == start && pass.n_samples <= most => pass,
             _ => self.begin_pass(start, most),
         };
+        if observer.has_cut_short() {
+            return PassEnd::Canceled;
+        }
         observer.pass_started(start..start + pass.n_samples);
         let Self { context, strategy, tiles, mark, .. } = self;
         let (strategy, settings): (&S, _) = (strategy, &context.settings);
@@ -265,7 +268,12 @@ impl<'a, S: Strategy> Renderer<'a, S> {
                 if observer.canceled() {
                     return false;
                 }
+                let before = observer.may_cut_short().then(|| tile.clone());
                 let counts = tile.render(context, strategy, &pass, scratch, observer);
+                if let Some(before) = before.filter(|_| observer.has_cut_short()) {
+                    *tile = before;
+                    return false;
+                }
                 tile.changed = *mark;
                 observer.tile_finished(&counts);
                 observer.tile_rendered(&tile.view());
