@@ -151,7 +151,9 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let render = watch.lap();
     let rare = warn_of_rare_acceptance(spec, &rendering.counts);
     let reason = || domelight_lab::black::reason(&rendering.layers).map(str::to_owned);
-    if let Some(text) = rare.or_else(reason) {
+    // A part may be one of the background.
+    let reason = rare.or_else(|| if arguments.render_run.is_part() { None } else { reason() });
+    if let Some(text) = reason {
         warn(quiet, &text);
     }
 
