@@ -129,13 +129,13 @@ def spherical(phi, theta):
 
 
 def unreal(path):
-    """A script: +X in front, +Y on the right, +Z up; the panorama's center is at −Y, its right half at +X."""
+    """A script: left-handed with +Z up, y and z exchanged; the panorama's center is at −Y, its right half at +X."""
     found = {}
     for line in ast.parse(path.read_text()).body:
         if isinstance(line, ast.Assign) and line.targets[0].id.isupper():
             found[line.targets[0].id] = ast.literal_eval(line.value)
     assert found["LUMENS_PER_WATT"] == 683
-    world = np.array([[0, 1, 0], [0, 0, 1], [-1, 0, 0]])
+    world = np.array([[1, 0, 0], [0, 0, 1], [0, 1, 0]])
     lights = [(world @ toward, strength * np.array(color)) for _, toward, color, strength, _ in found["LIGHTS"]]
     if found["DOME"] is None:
         return lights, None, None

@@ -25,6 +25,10 @@ pub enum Convention {
     Gltf,
     /// three.js' `EquirectangularReflectionMapping`.
     Three,
+    /// Babylon.js' `HDRCubeTexture` in a left-handed scene, as scenes are by default.
+    Babylon,
+    /// Unreal Engine's sky light with an imported `.hdr`.
+    Unreal,
     /// Unity's panoramic skybox.
     Unity,
     /// Godot's panorama sky.
@@ -77,13 +81,15 @@ pub struct Indivisible {
 
 impl Convention {
     /// All programs.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Blender,
         Self::Mitsuba,
         Self::Pbrt,
         Self::Usd,
         Self::Gltf,
         Self::Three,
+        Self::Babylon,
+        Self::Unreal,
         Self::Unity,
         Self::Godot,
         Self::Radiance,
@@ -99,6 +105,8 @@ impl Convention {
             Self::Usd => "usd",
             Self::Gltf => "gltf",
             Self::Three => "three",
+            Self::Babylon => "babylon",
+            Self::Unreal => "unreal",
             Self::Unity => "unity",
             Self::Godot => "godot",
             Self::Radiance => "radiance",
@@ -115,9 +123,9 @@ impl Convention {
     /// The same in quarter turns, counterclockwise as seen from above: 1 has the center column on the left.
     fn quarter_turns(self) -> usize {
         match self {
-            Self::Radiance | Self::Nvdiffrec => 0,
+            Self::Unreal | Self::Radiance | Self::Nvdiffrec => 0,
             Self::Pbrt | Self::Unity => 1,
-            Self::Mitsuba | Self::Usd | Self::Godot => 2,
+            Self::Mitsuba | Self::Usd | Self::Babylon | Self::Godot => 2,
             Self::Blender | Self::Gltf | Self::Three => 3,
         }
     }
@@ -131,6 +139,8 @@ impl Convention {
             | Self::Usd
             | Self::Gltf
             | Self::Three
+            | Self::Babylon
+            | Self::Unreal
             | Self::Unity
             | Self::Godot
             | Self::Radiance
@@ -147,6 +157,8 @@ impl Convention {
             Self::Pbrt => "atan2(y, x)/2π, z up",
             Self::Usd => "¼ + atan2(z, x)/2π, y up",
             Self::Gltf | Self::Three => "½ + atan2(z, x)/2π, y up",
+            Self::Babylon => "½ + atan2(x, z)/2π, y up, left-handed",
+            Self::Unreal => "½ + atan2(x, −y)/2π, z up, left-handed",
             Self::Unity => "½ − atan2(z, x)/2π, y up, left-handed",
             Self::Radiance => "½ + atan2(x, y)/2π, z up",
             Self::Nvdiffrec => "½ + atan2(x, −z)/2π, y up",
@@ -157,9 +169,10 @@ impl Convention {
     pub fn center(self) -> &'static str {
         match self {
             Self::Blender | Self::Gltf | Self::Three | Self::Unity => "+X",
-            Self::Mitsuba | Self::Usd | Self::Godot => "+Z",
+            Self::Mitsuba | Self::Usd | Self::Babylon | Self::Godot => "+Z",
             Self::Pbrt => "−X",
             Self::Radiance => "+Y",
+            Self::Unreal => "−Y",
             Self::Nvdiffrec => "−Z",
         }
     }
@@ -173,6 +186,8 @@ impl Convention {
             Self::Usd => "Storm's dome light shader",
             Self::Gltf => "glTF-IBL-Sampler, panorama_to_cubemap.frag",
             Self::Three => "common.glsl, equirectUv",
+            Self::Babylon => "panoramaToCubemap.ts; its loader of glTF negates x",
+            Self::Unreal => "TextureCompressorModule.cpp; its importers exchange y and z",
             Self::Unity => "Skybox-Panoramic.shader; glTF exporters negate x",
             Self::Godot => "sky.glsl",
             Self::Radiance => "the brightness function that domelight writes",
@@ -183,9 +198,13 @@ impl Convention {
     /// What the statement rests on.
     pub fn proof(self) -> Proof {
         match self {
-            Self::Blender | Self::Mitsuba | Self::Three | Self::Radiance => Proof::Program,
+            Self::Blender | Self::Mitsuba | Self::Three | Self::Babylon | Self::Radiance => {
+                Proof::Program
+            }
             Self::Pbrt | Self::Usd => Proof::Format,
-            Self::Gltf | Self::Unity | Self::Godot | Self::Nvdiffrec => Proof::Source,
+            Self::Gltf | Self::Unreal | Self::Unity | Self::Godot | Self::Nvdiffrec => {
+                Proof::Source
+            }
         }
     }
 
@@ -335,7 +354,7 @@ mod tests {
     use testkit::Pcg;
 
     /// The column of a direction of a scene that came from the program, by the program's own look-up, and the scene's up
-    /// axis. Of Unity, with x negated, as glTF exporters do.
+    /// axis. As glTF comes from there, Unity and Babylon.js negate x, and Unreal exchanges y and z.
     fn column(convention: Convention, d: Vec3) -> f32 {
         let Vec3 { x, y, z } = d;
         match convention {
@@ -344,6 +363,8 @@ mod tests {
             Convention::Pbrt => y.atan2(x) / TAU,
             Convention::Usd => 0.25 + z.atan2(x) / TAU,
             Convention::Gltf | Convention::Three => 0.5 + z.atan2(x) / TAU,
+            Convention::Babylon => 0.5 + (-x).atan2(z) / TAU,
+            Convention::Unreal => 0.5 + x.atan2(-z) / TAU,
             Convention::Unity => 0.5 - z.atan2(-x) / TAU,
             Convention::Radiance => 0.5 + x.atan2(y) / TAU,
             Convention::Nvdiffrec => 0.5 + x.atan2(-z) / TAU,
@@ -351,7 +372,8 @@ mod tests {
     }
 
     fn up(convention: Convention) -> UpAxis {
-        if convention.look_up().contains("z up") { UpAxis::Z } else { UpAxis::Y }
+        let keeps_z_up = convention.look_up().ends_with("z up");
+        if keeps_z_up { UpAxis::Z } else { UpAxis::Y }
     }
 
     /// A map whose columns tell themselves apart.

@@ -1,7 +1,7 @@
 //! A Python script for the editor of Unreal Engine 5: `DirectionalLight`s and a `SkyLight` of the dome.
 //!
-//! Unreal's world is left-handed with +X in front, +Y on the right and +Z up; our front is −Z. A directional light has
-//! lux, and `light_source_angle` is its full angle \[degrees\]. A sky light's intensity times a texel is cd·m⁻². A picture
+//! Unreal's world is left-handed with +Z up. Its importers of glTF and FBX exchange y and z, and so does this script, so that
+//! the lights stand around an imported model as here: our front, −Z, is −Y. A directional light has lux, and `light_source_angle` is its full angle \[degrees\]. A sky light's intensity times a texel is cd·m⁻². A picture
 //! in `.hdr` is imported as a cube, whose panorama has its center at −Y (`TextureCompressorModule.cpp`,
 //! `GenerateBaseCubeMipFromLongitudeLatitude2D`), and a sky light looks it up turned by `source_cubemap_angle` from +X
 //! toward +Y (`ReflectionEnvironmentShaders.usf`, `CopyCubemapToCubeFaceColorPS`).
@@ -119,12 +119,12 @@ pub(super) fn encode(rig: &RigExport) -> Code<Python> {
 
 /// Unreal's direction of a direction in a world with +Y up.
 fn from_y_up(d: Vec3) -> Vec3 {
-    vec3(-d.z, d.x, d.y)
+    vec3(d.x, d.z, d.y)
 }
 
 /// The sky light's angle for a map with this rotation \[degrees\], in \[0, 360).
 fn dome_angle(rotation: f32) -> f32 {
-    (rotation - 90.0).rem_euclid(360.0)
+    rotation.rem_euclid(360.0)
 }
 
 #[cfg(test)]
@@ -134,9 +134,9 @@ mod tests {
     use crate::environment::Orientation;
 
     #[test]
-    fn front_is_x_right_is_y_and_up_is_z() {
-        assert_eq!(from_y_up(Vec3::NEG_Z), Vec3::X);
-        assert_eq!(from_y_up(Vec3::X), Vec3::Y);
+    fn front_is_minus_y_right_is_x_and_up_is_z() {
+        assert_eq!(from_y_up(Vec3::NEG_Z), Vec3::NEG_Y);
+        assert_eq!(from_y_up(Vec3::X), Vec3::X);
         assert_eq!(from_y_up(Vec3::Y), Vec3::Z);
     }
 

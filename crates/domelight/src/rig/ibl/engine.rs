@@ -67,8 +67,8 @@ impl Engine {
             // Babylon's world is left-handed; the center is +Z, its right half +X. In Bevy, panoramas face the camera's
             // −Z, and cubes are looked up with −z.
             Self::Babylon | Self::Bevy => [Vec3::X, Vec3::Y, Vec3::NEG_Z],
-            // The world is left-handed with +Z up; the center is +X, its right half +Y.
-            Self::Unreal => [Vec3::NEG_Z, Vec3::X, Vec3::Y],
+            // The world is left-handed with +Z up; the center is −Y, its right half +X.
+            Self::Unreal => [Vec3::X, Vec3::Z, Vec3::Y],
         };
         CubeAxes { world }
     }
