@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result};
 use domelight::environment::Environment;
 use domelight::picture::exr::ExrLayers;
+use domelight::picture::texture::{Texture, ktx2};
 use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings};
 use domelight::scene::SceneDescription;
 use domelight::{Rgb, RgbImage};
@@ -35,6 +36,10 @@ pub(crate) fn run(arguments: &TablesArguments, quiet: bool) -> Result<()> {
                 files::write(&output.path, |out| out.write_all(&tables.to_bytes()))?;
             }
             TablesFormat::Exr => write_exr(&output.path, &tables)?,
+            TablesFormat::Ktx2 => {
+                let texture = Texture::shader_tables(&tables);
+                files::write(&output.path, |out| ktx2::encode(&texture, out))?;
+            }
         }
     }
     for (path, language) in &snippets {

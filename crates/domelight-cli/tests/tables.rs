@@ -25,8 +25,18 @@ fn floats(folder: &TempDir, name: &str) -> Vec<f32> {
 #[test]
 fn both_files_hold_the_same_numbers() {
     let folder = probes();
-    let arguments =
-        ["tables", "map.exr", "-o", "a.tables.bin", "-o", "b.exr", "--env-rotate", "90"];
+    let arguments = [
+        "tables",
+        "map.exr",
+        "-o",
+        "a.tables.bin",
+        "-o",
+        "b.exr",
+        "-o",
+        "c.ktx2",
+        "--env-rotate",
+        "90",
+    ];
     let output = domelight(&folder, &arguments);
     assert!(done(&output).contains("-> a.tables.bin: 16x8 texels in 16x"), "{}", done(&output));
     let numbers = floats(&folder, "a.tables.bin");
@@ -46,6 +56,9 @@ fn both_files_hold_the_same_numbers() {
         let expected: Vec<f32> = numbers.iter().skip(i).step_by(4).copied().collect();
         assert_eq!(channel(name), expected, "{name}");
     }
+    let [numbers, texture] =
+        ["a.tables.bin", "c.ktx2"].map(|name| fs::read(folder.path().join(name)).unwrap());
+    assert!(texture.starts_with(b"\xabKTX 20\xbb") && texture.ends_with(&numbers));
 }
 
 #[test]
@@ -84,7 +97,7 @@ fn bad_input_leaves_no_file() {
     ended(&run(&["black.exr", "-o", "a.bin"]), 2, &["black.exr", "the map is black"]);
     let compensated = ["white.exr", "-o", "a.bin", "--mis-compensation", "--snippet", "wgsl"];
     ended(&run(&compensated), 2, &["white.exr", "MIS compensation leaves nothing"]);
-    ended(&run(&["map.exr", "-o", "a.ktx2"]), 2, &[".bin or .exr"]);
+    ended(&run(&["map.exr", "-o", "a.png"]), 2, &[".bin, .ktx2 or .exr"]);
     ended(&run(&["map.exr", "-o", "a.bin", "--texels", "0"]), 2, &["--texels"]);
     ended(&run(&["map.exr", "-o", "a.bin", "--snippet", "basic"]), 2, &["wgsl"]);
     ended(&run(&["map.exr"]), 2, &["--output"]);

@@ -1,14 +1,16 @@
 //! KTX2 and DDS files, read back by readers that were written from the specifications.
 
-use domelight::Rgb;
+use domelight::environment::Environment;
 use domelight::picture::texture::{TexelFormat, Texture, dds, ktx2};
 use domelight::rig::ibl::{BrdfTable, Cube, TableTerms};
+use domelight::rig::tables::{ShaderTables, TableSettings};
+use domelight::{Rgb, RgbImage};
 
 /// What a reader found: format number, size, faces, and each level's faces as bytes.
 #[derive(Debug, PartialEq)]
 struct Read {
     format: u32,
-    size: usize,
+    size: [usize; 2],
     faces: usize,
     levels: Vec<Vec<Vec<u8>>>,
 }
@@ -29,9 +31,10 @@ fn read_ktx2(file: &[u8], texel: usize) -> Read {
     );
     let [format, type_size, width, height, depth, layers, faces, levels, scheme] =
         std::array::from_fn(|i| word(file, 12 + 4 * i));
-    assert_eq!((width, depth, layers, scheme), (height, 0, 0, 0));
+    assert_eq!((depth, layers, scheme), (0, 0, 0));
     assert!(faces == 6 || faces == 1);
-    assert_eq!(type_size, if format == 123 { 4 } else { 2 });
+    assert_eq!(type_size, if [109, 123].contains(&format) { 4 } else { 2 });
+    let size = [width, height].map(|n| n as usize);
     let [dfd_at, dfd_length, kvd_at, kvd_length] =
         std::array::from_fn(|i| word(file, 48 + 4 * i) as usize);
     assert_eq!((long(file, 64), long(file, 72)), (0, 0), "supercompression data");
@@ -45,17 +48,17 @@ fn read_ktx2(file: &[u8], texel: usize) -> Read {
     let mut read = Vec::new();
     for level in (0..levels as usize).rev() {
         let [offset, length, uncompressed] = [0, 8, 16].map(|i| long(file, 80 + 24 * level + i));
-        let size = (width as usize >> level).max(1);
+        let texels: usize = size.map(|n| (n >> level).max(1)).iter().product();
         assert_eq!(offset, end.next_multiple_of(texel), "the smallest level comes first");
         assert_eq!(length, uncompressed);
-        assert_eq!(length, size * size * texel * faces as usize);
+        assert_eq!(length, texels * texel * faces as usize);
         end = offset + length;
         let level = &file[offset..end];
-        read.push(level.chunks(size * size * texel).map(<[u8]>::to_vec).collect());
+        read.push(level.chunks(texels * texel).map(<[u8]>::to_vec).collect());
     }
     assert_eq!(end, file.len());
     read.reverse();
-    Read { format, size: width as usize, faces: faces as usize, levels: read }
+    Read { format, size, faces: faces as usize, levels: read }
 }
 
 /// Khronos Data Format Specification 1.3, section 5: samples must cover the texel's bits once.
@@ -67,16 +70,16 @@ fn read_descriptor(block: &[u8], format: u32, texel: usize) {
     assert_eq!(block[8..12], [1, 1, 1, 0]);
     assert_eq!(word(block, 12), 0, "one texel per block");
     assert_eq!((block[16] as usize, word(block, 20)), (texel, 0));
-    let mut bits = 0u64;
+    let mut bits = 0u128;
     for sample in block[24..].chunks(16) {
         let first = u16::from_le_bytes([sample[0], sample[1]]);
-        let covered = ((1u64 << (sample[2] + 1)) - 1) << first;
+        let covered = ((1u128 << (sample[2] + 1)) - 1) << first;
         let is_exponent = sample[3] & 0x20 != 0;
         assert!(is_exponent || bits & covered == 0);
         bits |= covered;
         assert_eq!(sample[3] & 0xc0, if format == 123 { 0 } else { 0xc0 }, "signed float");
     }
-    assert_eq!(bits, u64::MAX >> (64 - 8 * texel));
+    assert_eq!(bits, u128::MAX >> (128 - 8 * texel));
 }
 
 fn read_metadata(mut data: &[u8]) {
@@ -118,7 +121,7 @@ fn read_dds(file: &[u8], texel: usize) -> Read {
         }
     }
     assert_eq!(at, file.len());
-    Read { format, size: width as usize, faces, levels: read }
+    Read { format, size: [width as usize; 2], faces, levels: read }
 }
 
 /// A chain of levels in which every texel is another color, a power of two in each channel.
@@ -167,10 +170,10 @@ fn cubes_are_read_back() {
             let from_dds = read_dds(&direct, format.bytes());
             let numbers = match format {
                 TexelFormat::SharedExponent => (123, 67),
-                TexelFormat::Half | TexelFormat::HalfPair => (97, 10),
+                TexelFormat::Half | TexelFormat::HalfPair | TexelFormat::Single => (97, 10),
             };
             assert_eq!((from_ktx.format, from_dds.format), numbers);
-            assert_eq!((from_ktx.size, from_ktx.faces), (size, 6));
+            assert_eq!((from_ktx.size, from_ktx.faces), ([size; 2], 6));
             assert_eq!(from_ktx.levels, from_dds.levels);
             for (cube, faces) in cubes.iter().zip(&from_ktx.levels) {
                 for (face, bytes) in faces.iter().enumerate() {
@@ -196,4 +199,18 @@ fn tables_are_read_back() {
     for (pair, bytes) in table.texels.iter().zip(from_ktx.levels[0][0].chunks(4)) {
         assert!((half(bytes) - pair[0]).abs() < 5e-4 && (half(&bytes[2..]) - pair[1]).abs() < 5e-4);
     }
+}
+
+#[test]
+fn tables_for_shaders_are_read_back() {
+    let map = RgbImage::from_fn(6, 5, |x, y| Rgb::new(1e-9 + x as f32, y as f32, 1e6));
+    let environment = Environment::from_image(map).unwrap();
+    let tables = ShaderTables::new(&environment, TableSettings::default()).unwrap();
+    let mut file = Vec::new();
+    ktx2::encode(&Texture::shader_tables(&tables), &mut file).unwrap();
+    let read = read_ktx2(&file, 16);
+    let (width, groups) = (tables.texture_width(), tables.texture());
+    assert_eq!((read.format, read.size, read.faces), (109, [width, groups.len() / width], 1));
+    let numbers = read.levels[0][0].chunks(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
+    assert!(numbers.eq(groups.into_iter().flatten()));
 }

@@ -27,7 +27,8 @@ pub(crate) struct TablesArguments {
     #[command(flatten)]
     pub(crate) light: Light,
 
-    /// Output: .bin, 32-bit floats in little-endian order, or .exr, the same as a picture with alpha; may be repeated
+    /// Output: .bin, 32-bit floats in little-endian order, or the same as a texture in .ktx2 or as a picture with alpha in
+    /// .exr; may be repeated
     #[arg(short, long, value_name = "FILE", required = true, help_heading = "Output")]
     pub(crate) output: Vec<TablesPath>,
     /// Also write the code that reads the tables, beside the first output; may be repeated
@@ -57,6 +58,8 @@ pub(crate) enum TablesFormat {
     Binary,
     /// A picture with R, G, B and A.
     Exr,
+    /// A texture.
+    Ktx2,
 }
 
 /// A file of tables to write.
@@ -75,7 +78,8 @@ impl FromStr for TablesPath {
         let format = match extension.as_deref() {
             Some("bin") => TablesFormat::Binary,
             Some("exr") => TablesFormat::Exr,
-            _ => return Err("its name must end in .bin or .exr".into()),
+            Some("ktx2") => TablesFormat::Ktx2,
+            _ => return Err("its name must end in .bin, .ktx2 or .exr".into()),
         };
         Ok(Self { path, format })
     }

@@ -33,8 +33,8 @@ pub fn encode(texture: &Texture, out: &mut dyn Write) -> io::Result<()> {
     }
     let mut head = IDENTIFIER.to_vec();
     let (format, type_size) = format(texture.format);
-    let size = texture.size as u32;
-    words(&mut head, &[format, type_size, size, size, 0, 0, texture.faces as u32]);
+    let [columns, rows] = texture.size.map(|n| n as u32);
+    words(&mut head, &[format, type_size, columns, rows, 0, 0, texture.faces as u32]);
     words(&mut head, &[n_levels as u32, 0]);
     words(&mut head, &[descriptor_at, descriptor.len()].map(|n| n as u32));
     words(&mut head, &[metadata_at, metadata.len()].map(|n| n as u32));
@@ -61,6 +61,7 @@ const fn format(format: TexelFormat) -> (u32, u32) {
         TexelFormat::SharedExponent => (123, 4), // VK_FORMAT_E5B9G9R9_UFLOAT_PACK32
         TexelFormat::Half => (97, 2),            // VK_FORMAT_R16G16B16A16_SFLOAT
         TexelFormat::HalfPair => (83, 2),        // VK_FORMAT_R16G16_SFLOAT
+        TexelFormat::Single => (109, 4),         // VK_FORMAT_R32G32B32A32_SFLOAT
     }
 }
 
@@ -71,9 +72,9 @@ type Sample = [u32; 5];
 const SIGNED_FLOAT: u32 = 0xc0;
 const EXPONENT: u32 = 0x20;
 
-/// Half precision in channel `channel`, of which −1 and 1 are named.
-const fn half(position: u32, channel: u32) -> Sample {
-    [16 * position, 16, channel | SIGNED_FLOAT, 0xbf80_0000, 0x3f80_0000]
+/// A number of half or single precision in channel `channel`, of which −1 and 1 are named.
+const fn float(bits: u32, position: u32, channel: u32) -> Sample {
+    [bits * position, bits, channel | SIGNED_FLOAT, 0xbf80_0000, 0x3f80_0000]
 }
 
 /// Mantissa and exponent of a channel; the upper value is 1 as (exponent, mantissa), the lower of the exponent its bias.
@@ -84,10 +85,14 @@ const fn shared(channel: u32) -> [Sample; 2] {
 /// The data format descriptor: one basic block, linear Rec. 709.
 fn descriptor(format: TexelFormat) -> Vec<u8> {
     const ALPHA: u32 = 15;
+    let rgba = |bits| {
+        (0..4).zip([0, 1, 2, ALPHA]).map(|(i, c)| float(bits, i, c)).collect::<Vec<Sample>>()
+    };
     let samples: Vec<Sample> = match format {
         TexelFormat::SharedExponent => [0, 1, 2].map(shared).concat(),
-        TexelFormat::Half => vec![half(0, 0), half(1, 1), half(2, 2), half(3, ALPHA)],
-        TexelFormat::HalfPair => vec![half(0, 0), half(1, 1)],
+        TexelFormat::Half => rgba(16),
+        TexelFormat::HalfPair => vec![float(16, 0, 0), float(16, 1, 1)],
+        TexelFormat::Single => rgba(32),
     };
     let block = 24 + 16 * samples.len() as u32;
     let mut bytes = Vec::new();

@@ -9,6 +9,7 @@ use half::f16;
 use crate::Rgb;
 use crate::math::functions;
 use crate::rig::ibl::{BrdfTable, Cube};
+use crate::rig::tables::ShaderTables;
 
 /// The format of a texel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub enum TexelFormat {
     Half,
     /// Two numbers of half precision; 4 bytes.
     HalfPair,
+    /// RGBA of single precision; 16 bytes.
+    Single,
 }
 
 impl TexelFormat {
@@ -27,6 +30,7 @@ impl TexelFormat {
         match self {
             Self::SharedExponent | Self::HalfPair => 4,
             Self::Half => 8,
+            Self::Single => 16,
         }
     }
 
@@ -35,15 +39,16 @@ impl TexelFormat {
         match self {
             Self::SharedExponent => 65408.0,
             Self::Half | Self::HalfPair => 65504.0,
+            Self::Single => f32::MAX,
         }
     }
 }
 
-/// A square texture, or a cube of six.
+/// A texture, or a cube of six squares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
-    /// The number of columns, and of rows, of level 0.
-    pub size: usize,
+    /// The numbers of columns and rows of level 0.
+    pub size: [usize; 2],
     /// 6 for a cube, whose faces are +X, −X, +Y, −Y, +Z, −Z; otherwise 1.
     pub faces: usize,
     /// The format of a texel.
@@ -69,7 +74,7 @@ impl Texture {
         let texels = levels.iter().flat_map(|cube| &cube.texels).filter(is_clipped).count();
         let lost = levels.first().map_or(0.0, |cube| lost_light(cube, largest));
         let encode = |cube: &Cube| cube.texels.iter().flat_map(|&t| encode(format, t)).collect();
-        let size = levels.first().map_or(0, |cube| cube.size);
+        let size = [levels.first().map_or(0, |cube| cube.size); 2];
         let levels = levels.iter().map(encode).collect();
         (Self { size, faces: 6, format, levels }, ClippedLight { texels, lost })
     }
@@ -78,12 +83,21 @@ impl Texture {
     pub fn table(table: &BrdfTable) -> Self {
         let bytes = |pair: &[f32; 2]| pair.map(|c| f16::from_f32(c).to_le_bytes()).concat();
         let level = table.texels.iter().flat_map(bytes).collect();
-        Self { size: table.size, faces: 1, format: TexelFormat::HalfPair, levels: vec![level] }
+        let (size, format) = ([table.size; 2], TexelFormat::HalfPair);
+        Self { size, faces: 1, format, levels: vec![level] }
     }
 
-    /// The number of columns of a level.
-    fn level_size(&self, level: usize) -> usize {
-        (self.size >> level).max(1)
+    /// The tables of a map for shaders, bit for bit.
+    pub fn shader_tables(tables: &ShaderTables) -> Self {
+        let (width, groups) = (tables.texture_width(), tables.texture());
+        let size = [width, groups.len() / width];
+        let level = groups.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
+        Self { size, faces: 1, format: TexelFormat::Single, levels: vec![level] }
+    }
+
+    /// The number of texels of a face of a level.
+    fn texels(&self, level: usize) -> usize {
+        self.size.map(|n| (n >> level).max(1)).iter().product()
     }
 }
 
@@ -113,6 +127,10 @@ fn encode(format: TexelFormat, texel: Rgb) -> Vec<u8> {
             let [r, g, b] = clipped.to_array();
             let channels = [r, g, b, 1.0].map(|c| f16::from_f32(c).to_le_bytes());
             channels.concat()[..format.bytes()].to_vec()
+        }
+        TexelFormat::Single => {
+            let [r, g, b] = clipped.to_array();
+            [r, g, b, 1.0].map(f32::to_le_bytes).concat()
         }
     }
 }
