@@ -8,6 +8,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, Window, load_probe};
 use domelight::environment::mapping::{CubeFaces, Mapping};
 use domelight::environment::{self, EnvironmentDensity, EnvironmentSample, Orientation, UpAxis};
+use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings};
 use domelight::{Rgb, RgbImage};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -429,6 +430,40 @@ impl Environment {
         rows(py, values, lead)
     }
 
+    /// Make tables that a renderer on a graphics card samples with the code of `shader_code`.
+    ///
+    /// Parameters
+    /// ----------
+    /// texels : int, default 524288
+    ///     A map that has more is averaged, with the same light; at most 33554432.
+    /// mis_compensation : bool, default False
+    ///     Sample only what is brighter than the mean, for renderers that also sample the BSDF.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (rows, columns, 4)
+    ///     A texture of RGBA32F, or a buffer of its rows, as `domelight tables` writes it.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If the map is black, or if `mis_compensation` leaves nothing to sample.
+    #[pyo3(signature = (*, texels = 524_288, mis_compensation = false),
+        text_signature = "($self, *, texels=524288, mis_compensation=False)")]
+    fn shader_tables<'py>(
+        &self,
+        py: Python<'py>,
+        texels: usize,
+        mis_compensation: bool,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let settings = TableSettings { texels, compensated: mis_compensation };
+        let tables = parallel(py, || ShaderTables::new(&self.inner, settings))?;
+        let tables = tables.map_err(|e| from_source(&e))?;
+        let (width, groups) = (tables.texture_width(), tables.texture());
+        let shape = [groups.len() / width, width, 4];
+        array(py, groups.into_flattened(), &shape)
+    }
+
     fn __repr__(&self) -> String {
         let map = self.inner.map();
         let Orientation { up, rotation } = self.inner.orientation();
@@ -641,4 +676,21 @@ impl Density {
         let environment = Environment { inner: environment.clone(), name: name.clone() };
         Ok((slf.get_type().into_any(), (Bound::new(py, environment)?, weights)))
     }
+}
+
+/// The code that samples `Environment.shader_tables`.
+///
+/// Parameters
+/// ----------
+/// language : {'wgsl', 'glsl', 'hlsl', 'slang', 'cuda', 'metal'}
+///     The language of the shader.
+///
+/// Returns
+/// -------
+/// str
+///     At most 60 lines with the functions `domelight_sample`, `domelight_pdf` and `domelight_look_up`.
+#[pyfunction]
+pub(crate) fn shader_code(language: &str) -> PyResult<String> {
+    let language: ShaderLanguage = language.parse().map_err(|e| from_source(&e))?;
+    Ok(language.snippet().to_owned())
 }

@@ -32,7 +32,7 @@ mod _domelight {
     use super::{
         bsdf::{Bsdf, Material},
         compare::compare,
-        environment::{Density, Environment},
+        environment::{Density, Environment, shader_code},
         error::{DomelightWarning, RenderInterrupted},
         film::Film,
         inspect::inspect,

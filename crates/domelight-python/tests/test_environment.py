@@ -175,3 +175,21 @@ def test_a_signal_ends_the_wait_for_a_map():
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
+
+
+def test_shader_tables_are_those_of_the_program(env):
+    tables = env.shader_tables(texels=64)
+    assert tables.shape[2] == 4 and tables.dtype == np.float32
+    width, height, levels, first = tables.reshape(-1, 4)[0]
+    assert width * height <= 64 and levels == np.ceil(np.log2(max(width, height)))
+    texels = tables.reshape(-1, 4)[int(first) :][: int(width * height)]
+    sines = np.diff(-np.cos(np.linspace(0, np.pi, int(height) + 1)))
+    sr = np.repeat(sines * 2 * np.pi / width, int(width))
+    assert np.isclose((texels[:, 3] * sr).sum(), 1, rtol=1e-5)
+    luminance = texels[:, :3] @ [0.2126, 0.7152, 0.0722]
+    assert np.isclose((luminance * sr).sum(), env.power, rtol=1e-4)
+    assert "domelight_sample" in dl.shader_code("wgsl")
+    with pytest.raises(ValueError, match="basic"):
+        dl.shader_code("basic")
+    with pytest.raises(ValueError, match="black"):
+        dl.Environment(np.zeros((2, 4, 3))).shader_tables()

@@ -7,7 +7,7 @@ from typing import Any, SupportsIndex, TypeAlias, final
 import numpy as np
 import numpy.typing as npt
 
-from ._names import Curve, Filter, Layer, Passes, Sampler, Up, Window
+from ._names import Curve, Filter, Layer, Passes, Sampler, ShaderLanguage, Up, Window
 from .metrics import Comparison
 from .strategies import Strategy
 from .testing import Chi2Report
@@ -86,6 +86,7 @@ class Environment:
     def pdf(self, wi: npt.ArrayLike) -> _Floats: ...
     def directions(self, uv: npt.ArrayLike) -> _Floats: ...
     def uv(self, wi: npt.ArrayLike) -> _Floats: ...
+    def shader_tables(self, *, texels: int = 524288, mis_compensation: bool = False) -> _Floats: ...
 
 @final
 class Density:
@@ -398,6 +399,7 @@ def write(
 def tone_map(
     picture: npt.ArrayLike, *, exposure: float | None = None, curve: Curve = "agx"
 ) -> _Floats: ...
+def shader_code(language: ShaderLanguage) -> str: ...
 def strategy_names() -> list[tuple[str, str]]: ...
 def compare_pictures(
     test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None

@@ -11,3 +11,4 @@ Layer: TypeAlias = Literal[
 ]
 Up: TypeAlias = Literal["y", "z"]
 Window: TypeAlias = Literal["data", "display"]
+ShaderLanguage: TypeAlias = Literal["wgsl", "glsl", "hlsl", "slang", "cuda", "metal"]
