@@ -364,10 +364,9 @@ mod tests {
             Convention::Usd => 0.25 + z.atan2(x) / TAU,
             Convention::Gltf | Convention::Three => 0.5 + z.atan2(x) / TAU,
             Convention::Babylon => 0.5 + (-x).atan2(z) / TAU,
-            Convention::Unreal => 0.5 + x.atan2(-z) / TAU,
             Convention::Unity => 0.5 - z.atan2(-x) / TAU,
             Convention::Radiance => 0.5 + x.atan2(y) / TAU,
-            Convention::Nvdiffrec => 0.5 + x.atan2(-z) / TAU,
+            Convention::Unreal | Convention::Nvdiffrec => 0.5 + x.atan2(-z) / TAU,
         }
     }
 
