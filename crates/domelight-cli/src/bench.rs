@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use domelight_lab::Host as _;
-use domelight_lab::bench::{self, BenchSettings, Results, Table};
+use domelight_lab::bench::{self, BenchSettings, Results, Suite, Table};
 
-use crate::args::bench::{BenchArguments, Peer, Suite};
+use crate::args::bench::{BenchArguments, Peer};
 use crate::command_line;
 use crate::compare::cache;
 use crate::error::{Interrupted, UsageError};
@@ -57,7 +57,7 @@ impl BenchArguments {
     fn settings(&self, host: &Terminal) -> BenchSettings {
         let python = self.python.clone();
         BenchSettings {
-            suite: self.suite.into(),
+            suite: self.suite,
             meshes: self.meshes.clone(),
             probes: self.probes.clone(),
             materials: self.materials.clone(),
@@ -78,17 +78,6 @@ impl BenchArguments {
     }
 }
 
-impl From<Suite> for bench::Suite {
-    fn from(suite: Suite) -> Self {
-        match suite {
-            Suite::Lecture => Self::Lecture,
-            Suite::Kernels => Self::Kernels,
-            Suite::Probes => Self::Probes,
-            Suite::Rigs => Self::Rigs,
-        }
-    }
-}
-
 /// Rejects options that the suite does not use.
 fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
     use Suite::{Kernels, Lecture, Probes, Rigs};
@@ -104,7 +93,7 @@ fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
     ];
     for (flag, given, suites) in given {
         if given && !suites.contains(&arguments.suite) {
-            let names: Vec<&str> = suites.iter().map(|&s| bench::Suite::from(s).name()).collect();
+            let names: Vec<String> = suites.iter().map(|suite| suite.name()).collect();
             return Err(UsageError(format!("{flag} requires --suite {}", names.join(" or "))));
         }
     }

@@ -6,6 +6,7 @@ use clap::{ArgAction, Args, ValueEnum};
 
 use super::{finite, positive};
 use domelight_lab::NamedStrategy;
+use domelight_lab::bench::Suite;
 use domelight_lab::job::value::Size;
 
 pub(super) const EXAMPLES: &str = "\
@@ -120,19 +121,6 @@ fn error(text: &str) -> Result<f64, String> {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
         _ => Err("not a number above 0".into()),
     }
-}
-
-/// A set of measurements.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Suite {
-    /// The lecture's statue at 176x248: the cost of its strategies
-    Lecture,
-    /// Rays per second of the ray kernel, and the time to build its BVH
-    Kernels,
-    /// Probes x meshes x materials: CPU time of each strategy to reach the same error
-    Probes,
-    /// Light rigs: the time to extract them, and their shading error
-    Rigs,
 }
 
 /// Another renderer.

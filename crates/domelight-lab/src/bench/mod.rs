@@ -16,6 +16,7 @@ mod table;
 
 use std::path::PathBuf;
 
+use clap::ValueEnum;
 pub use machine::Machine;
 pub use results::Results;
 pub use table::Table;
@@ -24,28 +25,24 @@ use crate::measure::Cache;
 use crate::{Error, Host, NamedStrategy};
 use results::Rows;
 
-/// What is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A set of measurements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Suite {
-    /// The lecture's statue at 176x248: what its strategies cost.
+    /// The lecture's statue at 176x248: the cost of its strategies
     Lecture,
-    /// Rays a second of the ray kernel, and the build of its tree.
+    /// Rays per second of the ray kernel, and the time to build its BVH
     Kernels,
-    /// Probes x meshes x materials: CPU time of each strategy to the same error.
+    /// Probes x meshes x materials: CPU time of each strategy to reach the same error
     Probes,
-    /// Rigs of lights: time to extract them, and how well they shade.
+    /// Light rigs: the time to extract them, and their shading error
     Rigs,
 }
 
 impl Suite {
     /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Lecture => "lecture",
-            Self::Kernels => "kernels",
-            Self::Probes => "probes",
-            Self::Rigs => "rigs",
-        }
+    pub fn name(self) -> String {
+        let value = self.to_possible_value().expect("no suite is hidden");
+        value.get_name().to_owned()
     }
 }
 
