@@ -78,7 +78,10 @@ impl BuiltinProbe {
         assert!(height > 0, "a probe has at least one row");
         match self {
             Self::Sky => sky::image(height),
-            Self::Studio => averaged(height, 1024, studio::radiance),
+            Self::Studio => {
+                let studio = studio::Studio::new();
+                averaged(height, 1024, |d| studio.radiance(d))
+            }
             Self::Cathedral => averaged(height, 2048, cathedral::radiance),
             Self::Constant => RgbImage::filled(2 * height, height, Rgb::WHITE),
         }
