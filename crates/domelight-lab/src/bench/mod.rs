@@ -41,8 +41,7 @@ pub enum Suite {
 impl Suite {
     /// The name on the command line.
     pub fn name(self) -> String {
-        let value = self.to_possible_value().expect("no suite is hidden");
-        value.get_name().to_owned()
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 }
 
