@@ -692,5 +692,5 @@ impl Density {
 #[pyfunction]
 pub(crate) fn shader_code(language: &str) -> PyResult<String> {
     let language: ShaderLanguage = language.parse().map_err(|e| from_source(&e))?;
-    Ok(language.snippet().to_owned())
+    Ok(language.snippet())
 }
