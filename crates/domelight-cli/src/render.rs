@@ -25,6 +25,7 @@ use crate::strategy::{RenderTask, acceptance};
 use crate::terminal::Terminal;
 use crate::tone::Shown;
 use crate::turntable::{Frame, Turntable};
+use domelight_lab::black;
 use domelight_lab::denoise::Denoiser;
 use domelight_lab::display::Display;
 use domelight_lab::job::Job;
@@ -150,10 +151,11 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let render = watch.lap();
     let rare = warn_of_rare_acceptance(spec, &rendering.counts);
-    let reason = || domelight_lab::black::reason(&rendering.layers).map(str::to_owned);
     // A part may be one of the background.
-    let reason = rare.or_else(|| if arguments.render_run.is_part() { None } else { reason() });
-    if let Some(text) = reason {
+    let is_whole = !arguments.render_run.is_part();
+    let unseen = || is_whole.then(|| black::unseen(&rendering.layers)).flatten();
+    let reason = || black::reason(&rendering.layers).or_else(unseen).map(str::to_owned);
+    if let Some(text) = rare.or_else(reason) {
         warn(quiet, &text);
     }
 

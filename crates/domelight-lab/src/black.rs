@@ -6,15 +6,18 @@ use domelight::render::Layers;
 /// The share of the unoccluded light below which a scene counts as black.
 const BLACK: f64 = 1e-6;
 
-/// Says why all that the scene covers is black, or that it covers nothing; `None` if it is seen.
+/// Says that the scene covers nothing of a whole picture; `None` if it does.
+pub fn unseen(layers: &Layers) -> Option<&'static str> {
+    let is_unseen = layers.n_hits.iter().all(|&n| n == 0);
+    is_unseen.then_some(
+        "the camera sees nothing of the model, which may be flat or out of view; try --view three-quarter",
+    )
+}
+
+/// Says why all that the scene covers is black; `None` if it is not, or covers nothing.
 pub fn reason(layers: &Layers) -> Option<&'static str> {
     // Pixels that the scene covers in part show the background, too.
     let is_covered = |&i: &usize| layers.n_hits[i] > 0 && layers.n_hits[i] == layers.n_samples[i];
-    if layers.n_hits.iter().all(|&n| n == 0) {
-        return Some(
-            "the camera sees nothing of the model, which may be flat or beside the picture; try --view three-quarter",
-        );
-    }
     let covered: Vec<usize> = (0..layers.n_hits.len()).filter(is_covered).collect();
     let sum =
         |pixels: &[Rgb]| -> f64 { covered.iter().map(|&i| f64::from(pixels[i].luminance())).sum() };
@@ -47,7 +50,9 @@ mod tests {
             layers
         };
         assert_eq!(reason(&layers(0.5, 0.5, 0.5)), None);
-        assert!(reason(&Layers::new(2, 1)).unwrap().contains("--view"));
+        assert_eq!(reason(&Layers::new(2, 1)), None);
+        assert!(unseen(&Layers::new(2, 1)).unwrap().contains("--view"));
+        assert_eq!(unseen(&layers(0.0, 0.0, 0.0)), None);
         assert!(reason(&layers(0.0, 0.0, 0.0)).unwrap().contains("materials"));
         assert!(reason(&layers(0.0, 1.0, 0.5)).unwrap().contains("encloses"));
         assert!(reason(&layers(0.0, 0.0, 0.5)).unwrap().contains("side"));
