@@ -33,12 +33,8 @@ def texts(package: dict) -> list[str]:
     return [file.read_text(encoding="utf-8", errors="replace").strip() for file in sorted(files)]
 
 
-def main() -> None:
-    roots = [(FOLDER / "Cargo.toml", "domelight-python")]
-    program = FOLDER / "../../Cargo.toml"
-    # A source distribution has no program.
-    if (FOLDER / "../domelight-cli/Cargo.toml").exists():
-        roots.append((program, "domelight-cli"))
+def text(roots: list[tuple[pathlib.Path, str]]) -> str:
+    """The notices of all packages that the roots, each of a manifest, depend on."""
     found: dict[tuple[str, str], dict] = {}
     for manifest, root in roots:
         for package in packages(manifest, root).values():
@@ -47,11 +43,20 @@ def main() -> None:
     by_text: dict[str, list[str]] = {}
     for (name, version), package in sorted(found.items()):
         lines.append(f"{name} {version}: {package['license'] or 'see its text'}")
-        for text in texts(package):
-            by_text.setdefault(text, []).append(f"{name} {version}")
-    for text, names in sorted(by_text.items(), key=lambda item: item[1]):
-        lines += ["", "-" * 80, ", ".join(names), "", text]
-    pathlib.Path(sys.argv[1]).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        for license_text in texts(package):
+            by_text.setdefault(license_text, []).append(f"{name} {version}")
+    for license_text, names in sorted(by_text.items(), key=lambda item: item[1]):
+        lines += ["", "-" * 80, ", ".join(names), "", license_text]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    roots = [(FOLDER / "Cargo.toml", "domelight-python")]
+    program = FOLDER / "../../Cargo.toml"
+    # A source distribution has no program.
+    if (FOLDER / "../domelight-cli/Cargo.toml").exists():
+        roots.append((program, "domelight-cli"))
+    pathlib.Path(sys.argv[1]).write_text(text(roots), encoding="utf-8")
 
 
 if __name__ == "__main__":
