@@ -1,6 +1,5 @@
 //! Comparisons of strategies at equal samples, rays or time.
 
-use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 use std::sync::{Mutex, PoisonError};
 
@@ -52,8 +51,7 @@ impl Host for PythonHost<'_> {
     }
 
     fn canceled(&self) -> bool {
-        let failure = self.job.failure();
-        failure.cancel().load(Ordering::Relaxed) || failure.has_failed()
+        self.job.failure().is_over()
     }
 }
 
@@ -147,7 +145,7 @@ pub(crate) fn compare<'py>(
                 // The receiver is still waiting.
                 let _ = sender.send(compared);
             });
-            wait(&results, job.failure().cancel(), &report_progress)
+            wait(&results, job.failure().canceled(), &report_progress)
         })
     })?;
     if let Some(error) = job.failure().take().or(stopped) {

@@ -39,9 +39,14 @@ impl Failure {
         self.failed.load(Ordering::Relaxed)
     }
 
-    /// Ends the call: the engine stops soon, and Python functions are no longer called.
-    pub(crate) fn cancel(&self) -> &AtomicBool {
+    /// The flag that cancels the call: the engine stops soon, and Python functions are no longer called.
+    pub(crate) fn canceled(&self) -> &AtomicBool {
         &self.canceled
+    }
+
+    /// Whether the call is to end: it failed or is canceled.
+    pub(crate) fn is_over(&self) -> bool {
+        self.has_failed() || self.canceled.load(Ordering::Relaxed)
     }
 
     /// Whether a Python function was not called because the call was canceled.

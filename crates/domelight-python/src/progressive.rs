@@ -98,7 +98,7 @@ impl Progressive {
             self.job.failure().resume();
             // If the thread has ended, its answer will be missing.
             let _ = self.questions.send(());
-            wait(&answers, self.job.failure().cancel(), &|py| {
+            wait(&answers, self.job.failure().canceled(), &|py| {
                 self.report(py, self.job.share(&self.done))
             })
         })?;

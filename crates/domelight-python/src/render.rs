@@ -387,10 +387,7 @@ impl Observer for Watch<'_> {
 
     fn canceled(&self) -> bool {
         let is_late = || self.end.is_some_and(|end| Instant::now() >= end);
-        let failure = self.job.failure();
-        failure.cancel().load(Ordering::Relaxed)
-            || failure.has_failed()
-            || (self.done.load(Ordering::Relaxed) > 0 && is_late())
+        self.job.failure().is_over() || (self.done.load(Ordering::Relaxed) > 0 && is_late())
     }
 
     fn may_cut_short(&self) -> bool {
@@ -563,7 +560,7 @@ pub(crate) fn render<'py>(
                 // The receiver is still waiting.
                 let _ = sender.send(rendered);
             });
-            wait(&results, job.failure().cancel(), &report)
+            wait(&results, job.failure().canceled(), &report)
         })
     })?;
     if let Some(error) = job.failure().take() {

@@ -254,6 +254,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
             Some((of, pass)) if of == start && pass.n_samples <= most => pass,
             _ => self.begin_pass(start, most),
         };
+        // Scouts that were cut short have seen nothing, so the pass is begun anew.
         if observer.has_cut_short() {
             return PassEnd::Canceled;
         }
