@@ -7,7 +7,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use domelight::bsdf::{MaterialSpec, ParseMaterialError};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::scene::builtin::BuiltinScene;
-use domelight::strategy::{StrategyError, StrategyKind, StrategyOptions};
+use domelight::strategy::{StrategyError, StrategyKind, StrategyParameter};
 
 /// The minimum similarity of names, in [0, 1], as in clap for options.
 const ALIKE: f64 = 0.7;
@@ -42,10 +42,10 @@ pub(crate) fn add_to(error: &mut clap::Error) {
     if let Some(ContextValue::String(option)) = error.get(ContextKind::InvalidArg)
         && error.kind() == ErrorKind::UnknownArgument
         && let Some(name) = option.strip_prefix("--")
-        && StrategyOptions::NAMES.contains(&name)
+        && let Some(parameter) = parameters().find(|parameter| parameter.name == name)
     {
-        let value = if name == "no-compensation" { "" } else { "=…" };
-        let text = format!("{name} belongs to the strategy's text: --strategy NAME:{name}{value}");
+        let notation = parameter.notation();
+        let text = format!("{name} belongs to the strategy's text: --strategy NAME:{notation}");
         error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![text.into()]));
         return;
@@ -65,6 +65,11 @@ pub(crate) fn add_to(error: &mut clap::Error) {
         let value = ContextValue::Strings(vec![name.to_owned()]);
         error.insert(ContextKind::SuggestedValue, value);
     }
+}
+
+/// The parameters of all strategies.
+fn parameters() -> impl Iterator<Item = &'static StrategyParameter> {
+    StrategyKind::ALL.into_iter().flat_map(|kind| kind.declaration().parameters)
 }
 
 #[cfg(test)]

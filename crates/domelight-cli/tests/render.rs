@@ -352,7 +352,7 @@ fn flags_that_contradict_are_usage_errors() {
         ("product:candidates=9", ["candidates", "sir"]),
         ("sir:9/8", ["candidates", "rays"]),
         ("rejection:rays=1", ["tries", "2"]),
-        ("median-cut:rays=4", ["rays", "lights"]),
+        ("median-cut:rays=4", ["rays", "brdf"]),
         ("environment:no-compensation", ["no-compensation", "mis"]),
     ] {
         refused(&render(&folder, &["--strategy", strategy]), 2, &words);

@@ -3,8 +3,8 @@
 use clap::Args;
 use domelight::render::{Filter, Passes, RenderSettings};
 use domelight::sampling::SamplerKind;
-use domelight::strategy::StrategyKind;
-use schemars::JsonSchema;
+use domelight::strategy::{StrategyDeclaration, StrategyKind, StrategyParameter};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use super::defaults;
@@ -20,14 +20,16 @@ pub struct Sampling {
     /// variance-minimization, optionally with numbers and options as in mis:3:1, sir:15/800 or product:8
     #[arg(id = "sampling.strategy", long = "strategy", value_name = "NAME[:OPTIONS]", default_value = "product",
           long_help = strategy_help())]
+    #[schemars(schema_with = "strategy_schema")]
     pub strategy: Text<NamedStrategy>,
     /// Camera samples per pixel; with product the average: noisy pixels get more, others fewer
     #[arg(id = "sampling.spp", long = "spp", value_name = "N", default_value = "32")]
     pub spp: Count<1, 16_777_216>,
-    /// With product, take the same number of camera samples in every pixel, but for the second sets of the variance layer
-    #[arg(id = "sampling.adaptive", long = "no-adaptive", action = clap::ArgAction::SetFalse)]
+    /// With product, take more camera samples in noisy pixels and fewer in others
+    #[arg(id = "sampling.adaptive", long = "no-adaptive", action = clap::ArgAction::SetFalse, help =
+          "With product, take the same number of camera samples in every pixel, but for the second sets of the variance layer")]
     pub adaptive: bool,
-    /// How the camera samples are divided into passes over the picture
+    /// How the camera samples are divided into passes over the picture; only product depends on it
     #[arg(
         id = "sampling.passes",
         long = "passes",
@@ -36,8 +38,8 @@ pub struct Sampling {
         conflicts_with = "sampling.target_error"
     )]
     pub passes: Choice<Passes>,
-    /// Stop each tile when two independent sets of its samples indicate an error (relMSE) of at most E, such as 1e-3,
-    /// but not before 16 samples
+    /// Stop each tile when two independent sets of its samples indicate at most this error (relMSE), such as 1e-3, but
+    /// not before 16 samples
     #[arg(id = "sampling.target_error", long = "target-error", value_name = "E")]
     pub target_error: Option<Positive>,
 }
@@ -91,22 +93,49 @@ impl Pixel {
     }
 }
 
-/// The options of strategies, for `--help`.
-const OPTIONS: &str = "\
-- rays=N: shadow rays per camera sample; with product the most, with rejection the samples to accept
-- split=M/N: environment and BRDF samples of mis
-- heuristic=power|balance, no-compensation: of mis
-- candidates=M, from=mixture|environment|brdf, resampling=sorted|systematic|multinomial|reservoir: of sir
-- tries=M, proposal=tighter|environment|brdf: of rejection
-- lights=N: of median-cut and variance-minimization";
-
-/// One line per strategy, for `--help`.
+/// Strategies and their parameters, for `--help`.
 fn strategy_help() -> String {
-    let line = |kind: StrategyKind| format!("- {}: {}", kind.name(), kind.summary());
-    let lines: Vec<String> = StrategyKind::ALL.into_iter().map(line).collect();
+    let parameter = |parameter: &StrategyParameter| {
+        let StrategyParameter { help, default, .. } = parameter;
+        let default = if default.is_empty() { "" } else { &format!(" [default: {default}]") };
+        format!("    {}: {help}{default}\n", parameter.notation())
+    };
+    let strategy = |kind: StrategyKind| {
+        let StrategyDeclaration { name, summary, parameters, .. } = kind.declaration();
+        format!("- {name}: {summary}\n{}", parameters.iter().map(parameter).collect::<String>())
+    };
     format!(
         "Sampling strategy, optionally with numbers and options as in mis:3:1, sir:15/800, product:8 or \
-         rejection:16:proposal=brdf\n\nStrategies:\n{}\n\nOptions, each after a colon:\n{OPTIONS}\n",
-        lines.join("\n")
+         rejection:16:proposal=brdf\n\nStrategies, and their options, each after a colon:\n{}",
+        StrategyKind::ALL.into_iter().map(strategy).collect::<String>()
     )
+}
+
+/// A text that begins with the name of a strategy.
+fn strategy_schema(_: &mut SchemaGenerator) -> Schema {
+    let names = |kind: StrategyKind| [&[kind.name()], kind.aliases()].concat();
+    let names: Vec<&str> = StrategyKind::ALL.into_iter().flat_map(names).collect();
+    json_schema!({ "type": "string", "pattern": format!("^({})(:.*)?$", names.join("|")) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The table of options in docs/strategies.md is that of the declarations.
+    #[test]
+    fn the_manual_lists_what_strategies_declare() {
+        let page = include_str!("../../../../docs/strategies.md");
+        let row = |kind: StrategyKind, parameter: &StrategyParameter| {
+            let StrategyParameter { help, default, .. } = parameter;
+            let notation = parameter.notation().replace('|', "\\|");
+            format!("| `{}` | `{notation}` | {help} | {default} |\n", kind.name())
+        };
+        let rows = StrategyKind::ALL.into_iter().flat_map(|kind| {
+            kind.declaration().parameters.iter().map(move |parameter| row(kind, parameter))
+        });
+        let head = "| strategy | option | what it is | default |\n|---|---|---|---|\n";
+        let table = rows.fold(head.to_owned(), |table, row| table + &row);
+        assert!(page.contains(&table), "docs/strategies.md must hold\n{table}");
+    }
 }

@@ -44,7 +44,10 @@ pub use rejection::{
 pub use sir::{
     CandidatePilot, Candidates, RAY_COST, Resampling, SamplingImportanceResampling, SirScratch,
 };
-pub use spec::{StrategyError, StrategyKind, StrategyOptions, StrategySpec};
+pub use spec::{
+    ParameterValues, StrategyDeclaration, StrategyError, StrategyKind, StrategyParameter,
+    StrategySpec,
+};
 
 pub use crate::simd::InstructionSet;
 

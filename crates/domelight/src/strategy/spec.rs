@@ -9,10 +9,8 @@
 //! | `sir:15/800`, `sir:15` | 15 of 800 candidates; a pilot chooses the number of candidates |
 //! | `median-cut:64`, `variance-minimization:64` | 64 directional lights |
 //!
-//! Numbers are optional. Further keys are `heuristic=balance|power` and `no-compensation` of `mis`,
-//! `proposal=environment|brdf|tighter` of `rejection`, and `from=environment|brdf|mixture` and
-//! `resampling=multinomial|systematic|sorted|reservoir` of `sir`. [`StrategySpec`] displays as the shortest
-//! such text, which parses to the same value.
+//! Numbers are optional. Each strategy [declares](StrategyDeclaration) its name and its parameters. [`StrategySpec`]
+//! displays as the shortest such text, which parses to the same value.
 
 use std::fmt;
 use std::str::FromStr;
@@ -116,35 +114,243 @@ const MAX_RAYS: u32 = 1 << 16;
 /// The maximum number of candidates, tries or lights.
 const MAX_CANDIDATES: u32 = 1 << 20;
 
-/// The values of one option by name; names of a value other than the first are aliases.
-type Names<T> = &'static [(&'static str, T)];
+/// The names of an enum's values, the default first.
+struct Names<T: 'static> {
+    names: &'static [&'static str],
+    values: &'static [T],
+}
+
+impl<T: Copy + PartialEq> Names<T> {
+    fn name(&self, value: T) -> &'static str {
+        let found = self.values.iter().position(|&v| v == value);
+        found.map_or("", |i| self.names[i])
+    }
+
+    fn value(&self, name: &str) -> Option<T> {
+        self.names.iter().position(|&n| n == name).map(|i| self.values[i])
+    }
+}
 
 const HEURISTICS: Names<Heuristic> =
-    &[("balance", Heuristic::Balance), ("power", Heuristic::Power)];
+    Names { names: &["power", "balance"], values: &[Heuristic::Power, Heuristic::Balance] };
 
-const PROPOSALS: Names<Proposal> = &[
-    ("environment", Proposal::Environment),
-    ("brdf", Proposal::Brdf),
-    ("tighter", Proposal::Tighter),
-];
+const PROPOSALS: Names<Proposal> = Names {
+    names: &["tighter", "environment", "brdf"],
+    values: &[Proposal::Tighter, Proposal::Environment, Proposal::Brdf],
+};
 
-const SOURCES: Names<Candidates> = &[
-    ("environment", Candidates::Environment),
-    ("brdf", Candidates::Brdf),
-    ("mixture", Candidates::Mixture),
-];
+const SOURCES: Names<Candidates> = Names {
+    names: &["mixture", "environment", "brdf"],
+    values: &[Candidates::Mixture, Candidates::Environment, Candidates::Brdf],
+};
 
-const RESAMPLINGS: Names<Resampling> = &[
-    ("multinomial", Resampling::Multinomial),
-    ("systematic", Resampling::Systematic),
-    ("sorted", Resampling::SystematicSorted),
-    ("reservoir", Resampling::Reservoir),
-];
+const RESAMPLINGS: Names<Resampling> = Names {
+    names: &["sorted", "systematic", "multinomial", "reservoir"],
+    values: &[
+        Resampling::SystematicSorted,
+        Resampling::Systematic,
+        Resampling::Multinomial,
+        Resampling::Reservoir,
+    ],
+};
 
-/// The name of a value in its table.
-fn name_of<T: PartialEq>(names: Names<T>, value: &T) -> &'static str {
-    names.iter().find(|(_, v)| v == value).map_or("", |(name, _)| name)
+/// What a strategy is called and takes. Its text form, its help and the manual's table are made from it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StrategyDeclaration {
+    /// The name in text form, such as `median-cut`.
+    pub name: &'static str,
+    /// Alternative names.
+    pub aliases: &'static [&'static str],
+    /// A one-line description.
+    pub summary: &'static str,
+    /// The parameters, `NAME=VALUE` in text form.
+    pub parameters: &'static [StrategyParameter],
+    /// The parameters that one number after the name sets, and two.
+    numbers: [&'static [&'static str]; 2],
 }
+
+/// A parameter of a strategy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StrategyParameter {
+    /// The name in text form, such as `rays`.
+    pub name: &'static str,
+    /// What it may be.
+    pub values: ParameterValues,
+    /// The default in text form, or in words; empty if the parameter is usually left out.
+    pub default: &'static str,
+    /// What it is, in a few words.
+    pub help: &'static str,
+}
+
+/// The values of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterValues {
+    /// A whole number from 1 to this one.
+    Count(u32),
+    /// Numbers of environment and BRDF samples, M/N, up to this one and not both zero.
+    Split(u32),
+    /// One of these names.
+    Names(&'static [&'static str]),
+    /// None; the parameter is its name alone.
+    Flag,
+}
+
+impl StrategyParameter {
+    /// A number of shadow rays.
+    const fn rays(default: &'static str, help: &'static str) -> Self {
+        Self { name: "rays", values: ParameterValues::Count(MAX_RAYS), default, help }
+    }
+
+    /// A number of candidates, tries or lights.
+    const fn count(name: &'static str, default: &'static str, help: &'static str) -> Self {
+        Self { name, values: ParameterValues::Count(MAX_CANDIDATES), default, help }
+    }
+
+    /// One of several values, by default the first.
+    const fn named<T>(name: &'static str, names: &Names<T>, help: &'static str) -> Self {
+        Self { name, values: ParameterValues::Names(names.names), default: names.names[0], help }
+    }
+
+    /// How it is written, such as `rays=N` or `heuristic=power|balance`.
+    pub fn notation(&self) -> String {
+        let name = self.name;
+        match self.values {
+            ParameterValues::Count(_) => format!("{name}=N"),
+            ParameterValues::Split(_) => format!("{name}=M/N"),
+            ParameterValues::Names(names) => format!("{name}={}", names.join("|")),
+            ParameterValues::Flag => name.to_owned(),
+        }
+    }
+
+    /// Rejects a text that is none of its values.
+    fn check(&self, text: &str) -> Result<(), StrategyError> {
+        let is_valid = match self.values {
+            ParameterValues::Count(most) => {
+                text.parse().is_ok_and(|n: u32| (1..=most).contains(&n))
+            }
+            ParameterValues::Split(most) => {
+                split(text).is_some_and(|[m, n]| m <= most && n <= most && m | n != 0)
+            }
+            ParameterValues::Names(names) => names.contains(&text),
+            ParameterValues::Flag => text.is_empty(),
+        };
+        let (option, value) = (self.name, text.to_owned());
+        let error = || StrategyError::BadValue { option, value, expected: self.values.to_string() };
+        is_valid.then_some(()).ok_or_else(error)
+    }
+}
+
+/// Says what a value must be.
+impl fmt::Display for ParameterValues {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count(most) => write!(f, "a whole number from 1 to {most}"),
+            Self::Split(most) => {
+                write!(f, "environment and BRDF samples such as 3/1, not both zero, up to {most}")
+            }
+            Self::Names(names) => write!(f, "one of {}", names.join(", ")),
+            Self::Flag => f.write_str("the name alone"),
+        }
+    }
+}
+
+const BRDF: StrategyDeclaration = StrategyDeclaration {
+    name: "brdf",
+    aliases: &[],
+    summary: "samples the BRDF",
+    parameters: &[StrategyParameter::rays("1", "shadow rays per camera sample")],
+    numbers: [&["rays"], &[]],
+};
+
+const ENVIRONMENT: StrategyDeclaration = StrategyDeclaration {
+    name: "environment",
+    aliases: &["env", "em"],
+    summary: "samples the environment's radiance",
+    parameters: &[StrategyParameter::rays("1", "shadow rays per camera sample")],
+    numbers: [&["rays"], &[]],
+};
+
+const MIS: StrategyDeclaration = StrategyDeclaration {
+    name: "mis",
+    aliases: &[],
+    summary: "samples both and weights them by multiple importance sampling",
+    parameters: &[
+        StrategyParameter::rays("2", "shadow rays per camera sample, half of them of each kind"),
+        StrategyParameter {
+            name: "split",
+            values: ParameterValues::Split(MAX_RAYS),
+            default: "",
+            help: "environment and BRDF samples, in place of rays",
+        },
+        StrategyParameter::named("heuristic", &HEURISTICS, "how samples are weighted"),
+        StrategyParameter {
+            name: "no-compensation",
+            values: ParameterValues::Flag,
+            default: "",
+            help: "samples the whole environment; otherwise, radiance below the mean is left to BRDF samples \
+                   (Karlík et al. 2019)",
+        },
+    ],
+    numbers: [&["rays"], &["split"]],
+};
+
+const PRODUCT: StrategyDeclaration = StrategyDeclaration {
+    name: "product",
+    aliases: &[],
+    summary: "samples the product of both from a table for each pixel, with learned visibility; traces rays \
+              where they matter",
+    parameters: &[StrategyParameter::rays("8", "the most shadow rays per camera sample")],
+    numbers: [&["rays"], &[]],
+};
+
+const REJECTION: StrategyDeclaration = StrategyDeclaration {
+    name: "rejection",
+    aliases: &[],
+    summary: "samples the product by rejection from one factor with a bound on the other",
+    parameters: &[
+        StrategyParameter::count(
+            "tries",
+            "16",
+            "tries per camera sample; with rays the most, 64 times the rays if not given",
+        ),
+        StrategyParameter::rays("", "samples to accept per camera sample, at least 2"),
+        StrategyParameter::named("proposal", &PROPOSALS, "the factor that tries are drawn from"),
+    ],
+    numbers: [&["tries"], &[]],
+};
+
+const SIR: StrategyDeclaration = StrategyDeclaration {
+    name: "sir",
+    aliases: &[],
+    summary: "samples the product by resampling candidates to rays",
+    parameters: &[
+        StrategyParameter::rays("1", "shadow rays per camera sample"),
+        StrategyParameter::count(
+            "candidates",
+            "chosen by a pilot for the least error per time",
+            "candidates per camera sample, at least as many as rays",
+        ),
+        StrategyParameter::named("from", &SOURCES, "the density that candidates are drawn from"),
+        StrategyParameter::named("resampling", &RESAMPLINGS, "how rays are picked"),
+    ],
+    numbers: [&["rays"], &["rays", "candidates"]],
+};
+
+const MEDIAN_CUT: StrategyDeclaration = StrategyDeclaration {
+    name: "median-cut",
+    aliases: &[],
+    summary: "directional lights by median cut: noise-free, but biased",
+    parameters: &[StrategyParameter::count("lights", "64", "lights in place of the environment")],
+    numbers: [&["lights"], &[]],
+};
+
+const VARIANCE_MINIMIZATION: StrategyDeclaration = StrategyDeclaration {
+    name: "variance-minimization",
+    aliases: &[],
+    summary: "directional lights by variance minimization: noise-free, but biased",
+    parameters: &[StrategyParameter::count("lights", "64", "lights in place of the environment")],
+    numbers: [&["lights"], &[]],
+};
 
 impl StrategyKind {
     /// All strategies.
@@ -159,82 +365,43 @@ impl StrategyKind {
         Self::VarianceMinimization,
     ];
 
+    /// What the strategy is called and takes.
+    pub fn declaration(self) -> &'static StrategyDeclaration {
+        match self {
+            Self::Brdf => &BRDF,
+            Self::Environment => &ENVIRONMENT,
+            Self::Mis => &MIS,
+            Self::Product => &PRODUCT,
+            Self::Rejection => &REJECTION,
+            Self::Sir => &SIR,
+            Self::MedianCut => &MEDIAN_CUT,
+            Self::VarianceMinimization => &VARIANCE_MINIMIZATION,
+        }
+    }
+
     /// The name in text form, such as `median-cut`.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Brdf => "brdf",
-            Self::Environment => "environment",
-            Self::Mis => "mis",
-            Self::Product => "product",
-            Self::Rejection => "rejection",
-            Self::Sir => "sir",
-            Self::MedianCut => "median-cut",
-            Self::VarianceMinimization => "variance-minimization",
-        }
+        self.declaration().name
     }
 
     /// A one-line description of the strategy.
     pub fn summary(self) -> &'static str {
-        match self {
-            Self::Brdf => "samples the BRDF",
-            Self::Environment => "samples the environment's radiance",
-            Self::Mis => "samples both and weights them by multiple importance sampling",
-            Self::Product => {
-                "samples the product of both from a table for each pixel, with learned \
-                 visibility; traces rays where they matter"
-            }
-            Self::Rejection => {
-                "samples the product by rejection from one factor with a bound on the other"
-            }
-            Self::Sir => "samples the product by resampling candidates to rays",
-            Self::MedianCut => "directional lights by median cut: noise-free, but biased",
-            Self::VarianceMinimization => {
-                "directional lights by variance minimization: noise-free, but biased"
-            }
-        }
+        self.declaration().summary
     }
 
     /// Alternative names.
     pub fn aliases(self) -> &'static [&'static str] {
-        match self {
-            Self::Environment => &["env", "em"],
-            Self::Brdf
-            | Self::Mis
-            | Self::Product
-            | Self::Rejection
-            | Self::Sir
-            | Self::MedianCut
-            | Self::VarianceMinimization => &[],
-        }
+        self.declaration().aliases
+    }
+
+    /// The strategies with a parameter of that name, in a list.
+    fn with(parameter: &str) -> String {
+        let has = |kind: &Self| kind.declaration().parameters.iter().any(|p| p.name == parameter);
+        Self::ALL.into_iter().filter(has).map(Self::name).collect::<Vec<_>>().join(", ")
     }
 }
 
-/// The options of a strategy; `None` stands for the default.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StrategyOptions {
-    /// Shadow rays per camera sample; for rejection, samples to accept.
-    pub rays: Option<u32>,
-    /// Environment and BRDF samples of `mis`.
-    pub split: Option<[u32; 2]>,
-    /// Directional lights of median cut and variance minimization.
-    pub lights: Option<u32>,
-    /// Candidates of `sir`.
-    pub candidates: Option<u32>,
-    /// The density from which `sir` draws candidates.
-    pub from: Option<Candidates>,
-    /// How `sir` picks rays from its candidates.
-    pub resampling: Option<Resampling>,
-    /// Tries of rejection.
-    pub tries: Option<u32>,
-    /// The density from which rejection draws its tries.
-    pub proposal: Option<Proposal>,
-    /// The heuristic for the weights of `mis`.
-    pub heuristic: Option<Heuristic>,
-    /// Whether `mis` samples the whole environment, without compensation.
-    pub no_compensation: bool,
-}
-
-/// An invalid strategy text or set of options.
+/// An invalid strategy text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StrategyError {
@@ -261,9 +428,9 @@ pub enum StrategyError {
     #[error("{option} applies only to {strategies}")]
     Misplaced {
         /// The option.
-        option: &'static str,
+        option: String,
         /// The strategies that accept it.
-        strategies: &'static str,
+        strategies: String,
     },
     /// Contradictory numbers.
     #[error("{0}")]
@@ -288,140 +455,83 @@ impl FromStr for StrategyKind {
     }
 }
 
-impl StrategyOptions {
-    /// The names of all options.
-    pub const NAMES: [&str; 10] = [
-        "rays",
-        "split",
-        "lights",
-        "candidates",
-        "from",
-        "resampling",
-        "tries",
-        "proposal",
-        "heuristic",
-        "no-compensation",
-    ];
+/// The parameters that a text gives.
+struct Given {
+    kind: StrategyKind,
+    values: Vec<(&'static str, String)>,
+}
 
-    /// Splits `NAME[:OPTION]…` into the strategy and its options.
-    ///
-    /// # Errors
-    /// If the name or an option is unknown or a value is out of range.
-    pub fn parse(text: &str) -> Result<(StrategyKind, Self), StrategyError> {
+impl Given {
+    /// Splits `NAME[:PARAMETER]…` into the strategy and its parameters.
+    fn parse(text: &str) -> Result<Self, StrategyError> {
         let mut parts = text.trim().split(':').map(str::trim).peekable();
-        let kind: StrategyKind = parts.next().unwrap_or_default().parse()?;
-        let mut options = Self::default();
+        let kind = parts.next().unwrap_or_default().parse()?;
+        let mut given = Self { kind, values: Vec::new() };
         if let Some(first) = parts.next_if(|part| is_number(part)) {
-            let second = parts.next_if(|part| is_number(part));
-            options.set_numbers(kind, first, second)?;
+            given.set_numbers(first, parts.next_if(|part| is_number(part)))?;
         }
         for part in parts {
             match part.split_once('=') {
-                Some((key, value)) => options.set(key.trim(), value.trim())?,
-                None if part == "no-compensation" => options.no_compensation = true,
-                None => return Err(StrategyError::UnknownOption(part.to_owned())),
+                Some((name, value)) => given.set(name.trim(), value.trim())?,
+                None => given.set(part, "")?,
             }
         }
-        Ok((kind, options))
+        Ok(given)
     }
 
-    /// Sets the options given by the numbers after a strategy's name.
-    fn set_numbers(
-        &mut self,
-        kind: StrategyKind,
-        first: &str,
-        second: Option<&str>,
-    ) -> Result<(), StrategyError> {
-        use StrategyKind as K;
-        let two = first.split_once('/').or(second.map(|second| (first, second)));
-        if first.contains('/') && second.is_some() {
-            return Err(StrategyError::TwoNumbers);
+    /// Sets the parameters given by the numbers after a strategy's name.
+    fn set_numbers(&mut self, first: &str, second: Option<&str>) -> Result<(), StrategyError> {
+        let [one, two] = self.kind.declaration().numbers;
+        let (first, second) = match (first.split_once('/'), second) {
+            (None, None) => return one.iter().try_for_each(|name| self.set(name, first)),
+            (Some(pair), None) => pair,
+            (None, Some(second)) => (first, second),
+            (Some(_), Some(_)) => return Err(StrategyError::TwoNumbers),
+        };
+        match two {
+            [] => Err(StrategyError::TwoNumbers),
+            [both] => self.set(both, &format!("{first}/{second}")),
+            names => names.iter().zip([first, second]).try_for_each(|(name, n)| self.set(name, n)),
         }
-        match (kind, two) {
-            (K::Mis, Some((m, n))) => self.split = Some(split(m, n)?),
-            (K::Sir, Some((n, m))) => {
-                self.rays = Some(number("rays", n, MAX_RAYS)?);
-                self.candidates = Some(number("candidates", m, MAX_CANDIDATES)?);
-            }
-            (
-                K::Brdf
-                | K::Environment
-                | K::Product
-                | K::Rejection
-                | K::MedianCut
-                | K::VarianceMinimization,
-                Some(_),
-            ) => return Err(StrategyError::TwoNumbers),
-            (K::Rejection, None) => self.tries = Some(number("tries", first, MAX_CANDIDATES)?),
-            (K::MedianCut | K::VarianceMinimization, None) => {
-                self.lights = Some(number("lights", first, MAX_CANDIDATES)?);
-            }
-            (K::Brdf | K::Environment | K::Mis | K::Product | K::Sir, None) => {
-                self.rays = Some(number("rays", first, MAX_RAYS)?);
-            }
-        }
+    }
+
+    /// Sets one parameter by its name.
+    fn set(&mut self, name: &str, value: &str) -> Result<(), StrategyError> {
+        let parameters = self.kind.declaration().parameters;
+        let Some(parameter) = parameters.iter().find(|parameter| parameter.name == name) else {
+            let (option, strategies) = (name.to_owned(), StrategyKind::with(name));
+            return Err(match &strategies[..] {
+                "" => StrategyError::UnknownOption(option),
+                _ => StrategyError::Misplaced { option, strategies },
+            });
+        };
+        parameter.check(value)?;
+        self.values.push((parameter.name, value.to_owned()));
         Ok(())
     }
 
-    /// Sets one option by its name.
-    fn set(&mut self, key: &str, value: &str) -> Result<(), StrategyError> {
-        match key {
-            "rays" => self.rays = Some(number("rays", value, MAX_RAYS)?),
-            "split" => {
-                let (m, n) = value.split_once('/').unwrap_or((value, ""));
-                self.split = Some(split(m, n)?);
-            }
-            "lights" => self.lights = Some(number("lights", value, MAX_CANDIDATES)?),
-            "candidates" => self.candidates = Some(number("candidates", value, MAX_CANDIDATES)?),
-            "tries" => self.tries = Some(number("tries", value, MAX_CANDIDATES)?),
-            "from" => self.from = Some(named("from", SOURCES, value)?),
-            "resampling" => self.resampling = Some(named("resampling", RESAMPLINGS, value)?),
-            "proposal" => self.proposal = Some(named("proposal", PROPOSALS, value)?),
-            "heuristic" => self.heuristic = Some(named("heuristic", HEURISTICS, value)?),
-            _ => return Err(StrategyError::UnknownOption(key.to_owned())),
-        }
-        Ok(())
+    /// The text of a parameter, if it is given.
+    fn get(&self, name: &str) -> Option<&str> {
+        let last = self.values.iter().rev().find(|(given, _)| *given == name);
+        last.map(|(_, value)| &value[..])
     }
 
-    /// Fills missing options from `other`. Rays and split replace each other, because one follows from the other.
-    #[must_use]
-    pub fn or(self, other: Self) -> Self {
-        Self {
-            rays: self.rays.or(other.rays.filter(|_| self.split.is_none())),
-            split: self.split.or(other.split.filter(|_| self.rays.is_none())),
-            lights: self.lights.or(other.lights),
-            candidates: self.candidates.or(other.candidates),
-            from: self.from.or(other.from),
-            resampling: self.resampling.or(other.resampling),
-            tries: self.tries.or(other.tries),
-            proposal: self.proposal.or(other.proposal),
-            heuristic: self.heuristic.or(other.heuristic),
-            no_compensation: self.no_compensation || other.no_compensation,
-        }
+    /// A number that is given.
+    fn number(&self, name: &str) -> Option<u32> {
+        self.get(name)?.parse().ok()
     }
 
-    /// Rejects options of other strategies.
-    fn check(&self, kind: StrategyKind) -> Result<(), StrategyError> {
-        use StrategyKind as K;
-        let is_rig = matches!(kind, K::MedianCut | K::VarianceMinimization);
-        let misplaced = [
-            ("heuristic", self.heuristic.is_some(), kind == K::Mis, "mis"),
-            ("split", self.split.is_some(), kind == K::Mis, "mis"),
-            ("no-compensation", self.no_compensation, kind == K::Mis, "mis"),
-            ("candidates", self.candidates.is_some(), kind == K::Sir, "sir"),
-            ("from", self.from.is_some(), kind == K::Sir, "sir"),
-            ("resampling", self.resampling.is_some(), kind == K::Sir, "sir"),
-            ("tries", self.tries.is_some(), kind == K::Rejection, "rejection"),
-            ("proposal", self.proposal.is_some(), kind == K::Rejection, "rejection"),
-            ("lights", self.lights.is_some(), is_rig, "median-cut and variance-minimization"),
-            ("rays", self.rays.is_some(), !is_rig, "strategies without lights"),
-        ];
-        match misplaced.into_iter().find(|&(_, is_given, applies, _)| is_given && !applies) {
-            Some((option, _, _, strategies)) => {
-                Err(StrategyError::Misplaced { option, strategies })
-            }
-            None => Ok(()),
-        }
+    /// A number, or its default.
+    fn number_or_default(&self, name: &str) -> u32 {
+        let parameters = self.kind.declaration().parameters.iter();
+        let default = parameters.filter(|p| p.name == name).find_map(|p| p.default.parse().ok());
+        self.number(name).or(default).expect("the declaration has a default")
+    }
+
+    /// One of several values, or the default.
+    fn named<T: Copy + PartialEq>(&self, name: &str, names: &Names<T>) -> T {
+        let given = self.get(name).and_then(|value| names.value(value));
+        given.unwrap_or(names.values[0])
     }
 }
 
@@ -429,37 +539,10 @@ fn is_number(part: &str) -> bool {
     part.starts_with(|c: char| c.is_ascii_digit()) && !part.contains('=')
 }
 
-/// A count from 1 to `most`.
-fn number(option: &'static str, text: &str, most: u32) -> Result<u32, StrategyError> {
-    text.parse().ok().filter(|n| (1..=most).contains(n)).ok_or_else(|| StrategyError::BadValue {
-        option,
-        value: text.to_owned(),
-        expected: format!("a whole number from 1 to {most}"),
-    })
-}
-
 /// Environment and BRDF samples.
-fn split(m: &str, n: &str) -> Result<[u32; 2], StrategyError> {
-    let count = |text: &str| text.parse().ok().filter(|n| *n <= MAX_RAYS);
-    let counts = count(m).zip(count(n)).map(|(m, n)| [m, n]).filter(|counts| *counts != [0, 0]);
-    counts.ok_or_else(|| StrategyError::BadValue {
-        option: "split",
-        value: format!("{m}:{n}"),
-        expected: format!(
-            "environment and BRDF samples such as 3:1, not both zero, up to {MAX_RAYS}"
-        ),
-    })
-}
-
-fn named<T: Copy>(option: &'static str, names: Names<T>, text: &str) -> Result<T, StrategyError> {
-    names.iter().find(|(name, _)| *name == text).map(|(_, value)| *value).ok_or_else(|| {
-        let list: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
-        StrategyError::BadValue {
-            option,
-            value: text.to_owned(),
-            expected: format!("one of {}", list.join(", ")),
-        }
-    })
+fn split(text: &str) -> Option<[u32; 2]> {
+    let (m, n) = text.split_once('/')?;
+    Some([m.parse().ok()?, n.parse().ok()?])
 }
 
 impl StrategySpec {
@@ -474,30 +557,27 @@ impl StrategySpec {
         }
     }
 
-    /// Creates the strategy with these options. The defaults are 1 ray, 1:1 for `mis`, 8 rays for `product`, 16 tries
-    /// and 64 lights.
-    ///
-    /// # Errors
-    /// If an option belongs to another strategy, or options contradict each other.
-    pub fn new(kind: StrategyKind, options: &StrategyOptions) -> Result<Self, StrategyError> {
+    fn new(given: &Given) -> Result<Self, StrategyError> {
         use StrategyKind as K;
-        options.check(kind)?;
-        let rays = options.rays.unwrap_or(1);
-        let n_lights = options.lights.unwrap_or(64);
-        Ok(match kind {
-            K::Brdf => Self::Brdf { n_samples: rays },
-            K::Environment => Self::Environment { n_samples: rays },
-            K::Mis => Self::mis(options)?,
-            K::Product => Self::Product { n_rays: options.rays.unwrap_or(8) },
-            K::Rejection => Self::rejection(options)?,
-            K::Sir => Self::sir(rays, options)?,
-            K::MedianCut => Self::MedianCut { n_lights },
-            K::VarianceMinimization => Self::VarianceMinimization { n_lights },
+        let n_samples = || given.number_or_default("rays");
+        let n_lights = || given.number_or_default("lights");
+        Ok(match given.kind {
+            K::Brdf => Self::Brdf { n_samples: n_samples() },
+            K::Environment => Self::Environment { n_samples: n_samples() },
+            K::Mis => Self::mis(given)?,
+            K::Product => Self::Product { n_rays: n_samples() },
+            K::Rejection => Self::rejection(given)?,
+            K::Sir => Self::sir(given)?,
+            K::MedianCut => Self::MedianCut { n_lights: n_lights() },
+            K::VarianceMinimization => Self::VarianceMinimization { n_lights: n_lights() },
         })
     }
 
-    fn mis(options: &StrategyOptions) -> Result<Self, StrategyError> {
-        let [n_environment, n_brdf] = match (options.split, options.rays) {
+    fn mis(given: &Given) -> Result<Self, StrategyError> {
+        let [n_environment, n_brdf] = match (
+            given.get("split").and_then(split),
+            given.number("rays"),
+        ) {
             (Some(_), Some(_)) => {
                 return Err(StrategyError::Contradiction("give split or rays, not both"));
             }
@@ -508,43 +588,49 @@ impl StrategySpec {
                      for one kind only",
                 ));
             }
-            (None, rays) => {
-                let n = rays.unwrap_or(2);
+            (None, _) => {
+                let n = given.number_or_default("rays");
                 [n.div_ceil(2), n / 2]
             }
         };
         Ok(Self::Mis {
             n_environment,
             n_brdf,
-            heuristic: options.heuristic.unwrap_or(Heuristic::Power),
+            heuristic: given.named("heuristic", &HEURISTICS),
             // Without BRDF samples, the dim light would be lost.
-            compensation: !options.no_compensation && n_brdf > 0,
+            compensation: given.get("no-compensation").is_none() && n_brdf > 0,
         })
     }
 
-    fn rejection(options: &StrategyOptions) -> Result<Self, StrategyError> {
-        let stop = match (options.rays, options.tries) {
-            (None, tries) => StoppingRule::Tries(tries.unwrap_or(16)),
+    fn rejection(given: &Given) -> Result<Self, StrategyError> {
+        /// The tries at most, for each sample to accept.
+        const TRIES_PER_RAY: u32 = 64;
+        let stop = match (given.number("rays"), given.number("tries")) {
+            (None, _) => StoppingRule::Tries(given.number_or_default("tries")),
             (Some(1), _) => {
                 return Err(StrategyError::Contradiction(
                     "rejection estimates from at least two accepted samples: use 2 rays or more, or tries for \
                      a fixed number of tries",
                 ));
             }
-            (Some(n), tries) => StoppingRule::Accepted { n, max_tries: tries.unwrap_or(64 * n) },
+            (Some(n), tries) => {
+                StoppingRule::Accepted { n, max_tries: tries.unwrap_or(TRIES_PER_RAY * n) }
+            }
         };
-        Ok(Self::Rejection { proposal: options.proposal.unwrap_or_default(), stop })
+        Ok(Self::Rejection { proposal: given.named("proposal", &PROPOSALS), stop })
     }
 
-    fn sir(n_samples: u32, options: &StrategyOptions) -> Result<Self, StrategyError> {
-        if options.candidates.is_some_and(|m| m < n_samples) {
+    fn sir(given: &Given) -> Result<Self, StrategyError> {
+        let (n_samples, n_candidates) =
+            (given.number_or_default("rays"), given.number("candidates"));
+        if n_candidates.is_some_and(|m| m < n_samples) {
             return Err(StrategyError::Contradiction("candidates must not be fewer than rays"));
         }
         Ok(Self::Sir {
-            n_candidates: options.candidates,
+            n_candidates,
             n_samples,
-            candidates: options.from.unwrap_or_default(),
-            resampling: options.resampling.unwrap_or_default(),
+            candidates: given.named("from", &SOURCES),
+            resampling: given.named("resampling", &RESAMPLINGS),
         })
     }
 
@@ -591,7 +677,7 @@ impl StrategySpec {
             }
             Self::Mis { n_environment, n_brdf, heuristic, compensation } => format!(
                 "mis {n_environment}:{n_brdf}, {} heuristic{}",
-                name_of(HEURISTICS, &heuristic),
+                HEURISTICS.name(heuristic),
                 if compensation { ", compensated" } else { "" }
             ),
             Self::Product { n_rays } => format!("product, up to {n_rays} per camera sample"),
@@ -635,8 +721,7 @@ impl FromStr for StrategySpec {
     type Err = StrategyError;
 
     fn from_str(text: &str) -> Result<Self, StrategyError> {
-        let (kind, options) = StrategyOptions::parse(text)?;
-        Self::new(kind, &options)
+        Self::new(&Given::parse(text)?)
     }
 }
 
@@ -653,7 +738,7 @@ impl fmt::Display for StrategySpec {
             Self::Mis { n_environment, n_brdf, heuristic, compensation } => {
                 write!(f, ":{n_environment}:{n_brdf}")?;
                 if heuristic != Heuristic::Power {
-                    write!(f, ":heuristic={}", name_of(HEURISTICS, &heuristic))?;
+                    write!(f, ":heuristic={}", HEURISTICS.name(heuristic))?;
                 }
                 f.write_str(if compensation || n_brdf == 0 { "" } else { ":no-compensation" })
             }
@@ -667,7 +752,7 @@ impl fmt::Display for StrategySpec {
                 if proposal == Proposal::default() {
                     return Ok(());
                 }
-                write!(f, ":proposal={}", name_of(PROPOSALS, &proposal))
+                write!(f, ":proposal={}", PROPOSALS.name(proposal))
             }
             Self::Sir { n_candidates, n_samples, candidates, resampling } => {
                 match n_candidates {
@@ -675,10 +760,10 @@ impl fmt::Display for StrategySpec {
                     None => write!(f, ":{n_samples}")?,
                 }
                 if candidates != Candidates::default() {
-                    write!(f, ":from={}", name_of(SOURCES, &candidates))?;
+                    write!(f, ":from={}", SOURCES.name(candidates))?;
                 }
                 if resampling != Resampling::default() {
-                    write!(f, ":resampling={}", name_of(RESAMPLINGS, &resampling))?;
+                    write!(f, ":resampling={}", RESAMPLINGS.name(resampling))?;
                 }
                 Ok(())
             }
@@ -735,8 +820,8 @@ mod tests {
 
     /// A random member of the set of valid strategies.
     fn random(pcg: &mut Pcg) -> StrategySpec {
-        fn pick<T: Copy>(pcg: &mut Pcg, names: Names<T>) -> T {
-            names[(pcg.next_f64() * names.len() as f64) as usize].1
+        fn pick<T: Copy>(pcg: &mut Pcg, names: &Names<T>) -> T {
+            names.values[(pcg.next_f64() * names.values.len() as f64) as usize]
         }
         let mut count = |most: u32| 1 + (pcg.next_f64().powi(4) * f64::from(most - 1)) as u32;
         let (n, m, tries) = (count(MAX_RAYS), count(MAX_CANDIDATES), count(MAX_CANDIDATES));
@@ -748,12 +833,12 @@ mod tests {
             StrategyKind::Mis => StrategySpec::Mis {
                 n_environment: n - 1,
                 n_brdf: n,
-                heuristic: pick(pcg, HEURISTICS),
+                heuristic: pick(pcg, &HEURISTICS),
                 compensation: coin,
             },
             StrategyKind::Product => StrategySpec::Product { n_rays: n },
             StrategyKind::Rejection => StrategySpec::Rejection {
-                proposal: pick(pcg, PROPOSALS),
+                proposal: pick(pcg, &PROPOSALS),
                 stop: if coin {
                     StoppingRule::Tries(tries)
                 } else {
@@ -763,8 +848,8 @@ mod tests {
             StrategyKind::Sir => StrategySpec::Sir {
                 n_candidates: coin.then_some(m.max(n)),
                 n_samples: n,
-                candidates: pick(pcg, SOURCES),
-                resampling: pick(pcg, RESAMPLINGS),
+                candidates: pick(pcg, &SOURCES),
+                resampling: pick(pcg, &RESAMPLINGS),
             },
             StrategyKind::MedianCut => StrategySpec::MedianCut { n_lights: m },
             StrategyKind::VarianceMinimization => {
@@ -796,14 +881,31 @@ mod tests {
             ("sir:9/8", "candidates must not"),
             ("sir:9/8/7", "candidates is '8/7'"),
             ("mis:0:0", "not both zero"),
+            ("mis:split=3", "such as 3/1"),
+            ("mis:no-compensation=1", "the name alone"),
             ("mis:color=red", "'color'"),
             ("mis:strategy=brdf", "'strategy'"),
-            ("mis:heuristic=best", "one of balance, power"),
+            ("mis:heuristic=best", "one of power, balance"),
             ("mis:1", "at least one sample of each"),
             ("rejection:rays=1", "at least two"),
         ] {
             let error = text.parse::<StrategySpec>().expect_err(text).to_string();
             assert!(error.contains(words), "{text}: {error}");
+        }
+    }
+
+    /// What is left out has the value that the declaration says.
+    #[test]
+    fn defaults_are_as_declared() {
+        for kind in StrategyKind::ALL {
+            let declaration = kind.declaration();
+            let usual: StrategySpec = declaration.name.parse().unwrap();
+            let is_value =
+                |p: &&StrategyParameter| !p.default.is_empty() && !p.default.contains(' ');
+            for parameter in declaration.parameters.iter().filter(is_value) {
+                let text = format!("{}:{}={}", declaration.name, parameter.name, parameter.default);
+                assert_eq!(text.parse(), Ok(usual), "{text}");
+            }
         }
     }
 
