@@ -14,12 +14,13 @@ use crate::arrays::{array, from_image};
 use crate::engine::{caught, wait};
 use crate::environment::Environment;
 use crate::error::{bad_value, from_source, warn};
-use crate::render::{Choice, Job, Keywords, choose};
+use crate::options;
+use crate::render::{Arguments, Choice, RenderSetup, choose};
 use crate::scene::{CameraLike, Scene};
 
 /// Ends the work on a signal or after a Python function has raised, and keeps the warnings.
 struct PythonHost<'a> {
-    job: &'a Job,
+    setup: &'a RenderSetup,
     warnings: Mutex<Vec<String>>,
     /// The finished fraction, in [0, 1], and the current step.
     state: Mutex<(f64, String)>,
@@ -51,7 +52,7 @@ impl Host for PythonHost<'_> {
     }
 
     fn canceled(&self) -> bool {
-        self.job.failure().is_over()
+        self.setup.failure().is_over()
     }
 }
 
@@ -65,11 +66,9 @@ pub(crate) fn compare<'py>(
     budget: &str,
     seeds: u32,
     reference_spp: u32,
-    size: [i64; 2],
-    seed: u64,
+    options: &Bound<'py, PyDict>,
     threads: Option<usize>,
     camera: Option<CameraLike>,
-    hide_env: bool,
     tile_size: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
@@ -77,35 +76,22 @@ pub(crate) fn compare<'py>(
         return Err(bad_value("there is no strategy to compare"));
     };
     let budget: Budget = budget.parse().map_err(|e| from_source(&e))?;
-    for (name, value, most) in [("seeds", seeds, 1000), ("reference_spp", reference_spp, 1 << 24)] {
-        if !(1..=most).contains(&value) {
-            return Err(bad_value(format!("{name} is {value}; it must be from 1 to {most}")));
-        }
-    }
-    let keywords = Keywords {
+    let arguments = Arguments {
+        job: options::job_of_one_sample(options)?,
         strategy: first.clone(),
-        spp: 1,
-        size,
-        seed,
         threads,
         camera,
-        filter: "gaussian",
-        sampler: "sobol",
-        hide_env,
-        adaptive: true,
-        target_error: None,
         tile_size: Some(tile_size.unwrap_or(RenderSettings::default().tile_size)),
-        passes: "efficient",
     };
-    let job = &Job::new(py, scene.get(), env, keywords)?;
+    let setup = &RenderSetup::new(py, scene.get(), env, arguments)?;
     let lobes = &scene.get().inner.lobes;
     let choices = &strategies
         .into_iter()
         .map(|(name, strategy)| Ok((name, choose(&strategy, 1, lobes)?)))
         .collect::<PyResult<Vec<_>>>()?;
-    let report = &job.scene_report();
+    let report = &setup.scene_report();
     let host = &PythonHost {
-        job,
+        setup,
         warnings: Mutex::new(Vec::new()),
         state: Mutex::new((0.0, String::new())),
     };
@@ -114,8 +100,8 @@ pub(crate) fn compare<'py>(
         None => Ok(()),
     };
     let run = || -> Result<ComparisonResult, Error> {
-        let view = job.view(report);
-        let render = *job.settings();
+        let view = setup.view(report);
+        let render = *setup.settings();
         let settings = ComparisonSettings {
             render,
             budget,
@@ -141,14 +127,14 @@ pub(crate) fn compare<'py>(
         std::thread::scope(|scope| {
             let (sender, results) = mpsc::channel();
             scope.spawn(move || {
-                let compared = job.pool().and_then(|pool| caught(|| pool.install(run)));
+                let compared = setup.pool().and_then(|pool| caught(|| pool.install(run)));
                 // The receiver is still waiting.
                 let _ = sender.send(compared);
             });
-            wait(&results, job.failure().canceled(), &report_progress)
+            wait(&results, setup.failure().canceled(), &report_progress)
         })
     })?;
-    if let Some(error) = job.failure().take().or(stopped) {
+    if let Some(error) = setup.failure().take().or(stopped) {
         return Err(error);
     }
     let result = result?.map_err(|e| from_source(&e))?;

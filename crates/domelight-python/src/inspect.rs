@@ -12,7 +12,8 @@ use crate::arrays::{array, rows};
 use crate::engine::abandonable_on;
 use crate::environment::Environment;
 use crate::error::{bad_value, from_source, to_python};
-use crate::render::{Choice, Job, Keywords, choose};
+use crate::options;
+use crate::render::{Arguments, Choice, RenderSetup, choose};
 use crate::scene::{CameraLike, Scene};
 
 /// The result at a pixel.
@@ -30,11 +31,9 @@ pub(crate) fn inspect<'py>(
     env: Option<&Bound<'py, Environment>>,
     strategies: Vec<(String, Bound<'py, PyAny>)>,
     pixel: [i64; 2],
-    size: [i64; 2],
-    seed: u64,
+    options: &Bound<'py, PyDict>,
     threads: Option<usize>,
     camera: Option<CameraLike>,
-    hide_env: bool,
     resolution: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
     if !(8..=1024).contains(&resolution) {
@@ -43,22 +42,14 @@ pub(crate) fn inspect<'py>(
     let Some((_, first)) = strategies.first() else {
         return Err(bad_value("there is no strategy to inspect"));
     };
-    let keywords = Keywords {
+    let arguments = Arguments {
+        job: options::job_of_one_sample(options)?,
         strategy: first.clone(),
-        spp: 1,
-        size,
-        seed,
         threads,
         camera,
-        filter: "gaussian",
-        sampler: "sobol",
-        hide_env,
-        adaptive: true,
-        target_error: None,
         tile_size: None,
-        passes: "efficient",
     };
-    let job = Arc::new(Job::new(py, scene.get(), env, keywords)?);
+    let setup = Arc::new(RenderSetup::new(py, scene.get(), env, arguments)?);
     let inside = |[x, y]: [i64; 2]| Some([usize::try_from(x).ok()?, usize::try_from(y).ok()?]);
     let pixel = inside(pixel).ok_or_else(|| {
         let [x, y] = pixel;
@@ -69,14 +60,15 @@ pub(crate) fn inspect<'py>(
         .into_iter()
         .map(|(name, strategy)| Ok((name, choose(&strategy, 1, lobes)?)))
         .collect::<PyResult<Vec<_>>>()?;
-    let on_pool = job.clone();
+    let on_pool = setup.clone();
     let inspect = move || -> PyResult<Found> {
-        let job = &*on_pool;
-        let inspector = job.inspector(pixel).map_err(|e| from_source(&e))?;
+        let setup = &*on_pool;
+        let inspector = setup.inspector(pixel).map_err(|e| from_source(&e))?;
         let one = |(name, choice): &(String, Choice)| match choice {
             Choice::Builtin(spec) => {
-                let spec = job.for_picture(*spec);
-                let strategy = PreparedStrategy::new(spec, job.environment()).map_err(to_python)?;
+                let spec = setup.for_picture(*spec);
+                let strategy =
+                    PreparedStrategy::new(spec, setup.environment()).map_err(to_python)?;
                 let directions = inspector.directions(&strategy, resolution);
                 Ok((inspector.decompose(name, &strategy), directions))
             }
@@ -91,8 +83,8 @@ pub(crate) fn inspect<'py>(
             strategies: choices.iter().map(one).collect::<PyResult<_>>()?,
         })
     };
-    let found = abandonable_on(py, job.pool()?, inspect)?;
-    if let Some(error) = job.failure().take() {
+    let found = abandonable_on(py, setup.pool()?, inspect)?;
+    if let Some(error) = setup.failure().take() {
         return Err(error);
     }
     found?.into_dict(py, resolution)

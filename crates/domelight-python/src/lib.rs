@@ -15,6 +15,7 @@ mod inspect;
 mod lobe;
 mod metrics;
 mod notebook;
+mod options;
 mod picture;
 mod progressive;
 mod recipe;
@@ -37,6 +38,7 @@ mod _domelight {
         film::Film,
         inspect::inspect,
         metrics::{compare_pictures, error_map, flip, hdr_flip},
+        options::job_options,
         picture::{read, tone_map, write},
         progressive::{Progressive, progressive},
         render::{render, strategy_names},

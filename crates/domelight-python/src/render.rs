@@ -7,28 +7,29 @@ use std::time::{Duration, Instant};
 use domelight::environment;
 use domelight::inspect::{InspectError, Inspector};
 use domelight::render::{
-    Background, Counts, Filter, Observer, Passes, Provenance, RenderSettings, Renderer,
-    automatic_exposure,
+    Background, Counts, Observer, Passes, Provenance, RenderSettings, Renderer, automatic_exposure,
 };
-use domelight::sampling::SamplerKind;
 use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
 use domelight::strategy::{PreparedStrategy, Strategy, StrategyKind, StrategySpec};
 use domelight_lab::Ground;
+use domelight_lab::job::Job;
 use domelight_lab::names::file_name;
 use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
 use domelight_lab::scene::PreparedSceneRef;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rayon::ThreadPool;
 
 use crate::bsdf::MaterialLike;
 use crate::engine::{caught, n_threads, pool, wait};
 use crate::environment::Environment;
-use crate::error::{RenderInterrupted, bad_value, from_source, to_python, warn};
+use crate::error::{RenderInterrupted, bad_value, to_python, warn};
 use crate::failure::Failure;
 use crate::film::{Film, Making, automatic_exposure_of};
 use crate::lobe::PythonLobe;
-use crate::scene::{CameraLike, Scene, SceneData, size};
+use crate::options;
+use crate::scene::{CameraLike, Scene, SceneData};
 use crate::strategy::PythonStrategy;
 
 /// Memory per pixel of a render [bytes]: its sums and its layers.
@@ -41,7 +42,7 @@ pub(crate) enum Choice {
 }
 
 /// Everything that a render needs.
-pub(crate) struct Job {
+pub(crate) struct RenderSetup {
     scene: Arc<SceneData>,
     environment: Arc<environment::Environment>,
     camera: scene::Camera,
@@ -60,68 +61,34 @@ pub(crate) struct Job {
     failure: Arc<Failure>,
 }
 
-/// The keyword arguments of `render` and `progressive`.
-pub(crate) struct Keywords<'py> {
+/// What a caller gives beside scene and light.
+pub(crate) struct Arguments<'py> {
+    pub(crate) job: Job,
     pub(crate) strategy: Bound<'py, PyAny>,
-    pub(crate) spp: u32,
-    pub(crate) size: [i64; 2],
-    pub(crate) seed: u64,
     pub(crate) threads: Option<usize>,
     pub(crate) camera: Option<CameraLike>,
-    pub(crate) filter: &'py str,
-    pub(crate) sampler: &'py str,
-    pub(crate) hide_env: bool,
-    pub(crate) adaptive: bool,
-    pub(crate) target_error: Option<f32>,
     pub(crate) tile_size: Option<usize>,
-    pub(crate) passes: &'py str,
 }
 
 /// Pixels along the edge of a tile of a strategy written in Python: large enough that calls cost little.
 const PYTHON_TILE_SIZE: usize = 64;
 
-impl Job {
+impl RenderSetup {
     /// Checks the settings before any work.
     pub(crate) fn new(
         py: Python<'_>,
         scene: &Scene,
         environment: Option<&Bound<'_, Environment>>,
-        keywords: Keywords<'_>,
+        arguments: Arguments<'_>,
     ) -> PyResult<Self> {
-        let Keywords { strategy, spp, threads, adaptive, target_error, .. } = keywords;
-        let (width, height) = size(keywords.size)?;
-        if !(1..=1 << 24).contains(&spp) {
-            return Err(bad_value(format!("spp is {spp}; it must be from 1 to 16777216")));
-        }
-        if let Some(error) = target_error.filter(|e| !(e.is_finite() && *e > 0.0)) {
-            return Err(bad_value(format!(
-                "target_error is {error}; it must be positive and finite"
-            )));
-        }
-        if let Some(tile) = keywords.tile_size.filter(|n| !(1..=1024).contains(n)) {
+        let Arguments { job, strategy, threads, camera, tile_size } = arguments;
+        if let Some(tile) = tile_size.filter(|n| !(1..=1024).contains(n)) {
             return Err(bad_value(format!("tile_size is {tile}; it must be from 1 to 1024")));
         }
-        let filter: Filter = keywords.filter.parse().map_err(|e| from_source(&e))?;
-        let sampler = match keywords.sampler {
-            "sobol" => SamplerKind::Sobol,
-            "independent" => SamplerKind::Independent,
-            other => {
-                return Err(bad_value(format!(
-                    "sampler is {other:?}; it must be 'sobol' or 'independent'"
-                )));
-            }
-        };
-        let passes = match keywords.passes {
-            "efficient" => Passes::Efficient,
-            "doubling" => Passes::Doubling,
-            other => {
-                return Err(bad_value(format!(
-                    "passes is {other:?}; it must be 'efficient' or 'doubling'"
-                )));
-            }
-        };
+        let settings = job.settings();
+        let RenderSettings { width, height, .. } = settings;
         let n_threads = n_threads(threads)?;
-        let choice = choose(&strategy, spp, &scene.inner.lobes)?;
+        let choice = choose(&strategy, settings.n_samples, &scene.inner.lobes)?;
         require_memory(width, height)?;
 
         let (environment, probe) = if let Some(environment) = environment {
@@ -131,25 +98,12 @@ impl Job {
             (of_scene.inner, of_scene.name)
         };
         let up = environment.orientation().up.vector();
-        let (camera, camera_settings) =
-            scene.inner.camera(keywords.camera.as_ref(), (width, height), up)?;
+        let (camera, camera_settings) = scene.inner.camera(camera.as_ref(), (width, height), up)?;
         let default_tile = match choice {
-            Choice::Builtin(_) => RenderSettings::default().tile_size,
+            Choice::Builtin(_) => settings.tile_size,
             Choice::Python(_) => PYTHON_TILE_SIZE,
         };
-        let settings = RenderSettings {
-            width,
-            height,
-            n_samples: spp,
-            adaptive,
-            target_error,
-            passes,
-            seed: keywords.seed,
-            filter,
-            sampler,
-            background: if keywords.hide_env { Background::Hidden } else { Background::Shown },
-            tile_size: keywords.tile_size.unwrap_or(default_tile),
-        };
+        let settings = RenderSettings { tile_size: tile_size.unwrap_or(default_tile), ..settings };
         Ok(Self {
             scene: scene.inner.clone(),
             environment,
@@ -374,7 +328,7 @@ pub(crate) trait Visitor {
 
 /// Ends a render that is canceled, fails or runs out of time, and counts its samples.
 pub(crate) struct Watch<'a> {
-    pub(crate) job: &'a Job,
+    pub(crate) setup: &'a RenderSetup,
     pub(crate) done: &'a AtomicU64,
     /// The end of the time limit; started tiles are finished.
     pub(crate) end: Option<Instant>,
@@ -387,21 +341,21 @@ impl Observer for Watch<'_> {
 
     fn canceled(&self) -> bool {
         let is_late = || self.end.is_some_and(|end| Instant::now() >= end);
-        self.job.failure().is_over() || (self.done.load(Ordering::Relaxed) > 0 && is_late())
+        self.setup.failure().is_over() || (self.done.load(Ordering::Relaxed) > 0 && is_late())
     }
 
     fn may_cut_short(&self) -> bool {
-        self.job.calls_python()
+        self.setup.calls_python()
     }
 
     fn has_cut_short(&self) -> bool {
-        self.job.failure().has_cut_short()
+        self.setup.failure().has_cut_short()
     }
 }
 
 /// Renders until it is finished, canceled, or out of time.
 struct ToTheEnd<'a> {
-    job: &'a Job,
+    setup: &'a RenderSetup,
     watch: Watch<'a>,
     time: Option<Duration>,
 }
@@ -412,7 +366,7 @@ impl Visitor for ToTheEnd<'_> {
     fn visit<S: Strategy>(self, mut renderer: Renderer<S>) -> Film {
         let end = self.time.map(|time| Instant::now() + time);
         renderer.run(&Watch { end, ..self.watch });
-        self.job.film(&renderer)
+        self.setup.film(&renderer)
     }
 }
 
@@ -436,134 +390,44 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
     }
 }
 
-/// Render a scene under an environment.
-///
-/// Parameters
-/// ----------
-/// scene : Scene
-///     The scene.
-/// env : Environment, optional
-///     The light; by default the scene's own, otherwise the built-in sky.
-/// strategy : str or callable, default 'product'
-///     The sampling strategy: a text such as 'brdf:4', 'environment', 'mis:3:1', 'product:8', 'rejection:16',
-///     'sir:15/800', 'median-cut:64' or 'variance-minimization:64', or a function. A function receives the
-///     `ShadingPoints` of a tile and returns `(index, wi, weight)`: the points of the shadow rays (M,), their
-///     directions (M, 3) and their contributions if unoccluded (M, 3) or (M,), including 1 / n and 1 / pdf. Its
-///     attribute `n_rays`, 1 by default, is the maximum number of rays per point. It is called from several threads,
-///     one at a time.
-/// spp : int, default 32
-///     Camera samples per pixel; with 'product', on average.
-/// size : (int, int), default (640, 640)
-///     Width and height.
-/// seed : int, default 0
-///     Seed of the random numbers; the same seed gives the same bits.
-/// threads : int, optional
-///     By default the cores available to the process. The picture does not depend on it.
-/// camera : Camera, str or int, optional
-///     A camera, or the name or number of a camera in the file; by default the scene's own or one that frames the
-///     scene.
-/// filter : {'box', 'tent', 'gaussian', 'blackman-harris'}, default 'gaussian'
-///     The pixel filter.
-/// sampler : {'sobol', 'independent'}, default 'sobol'
-///     Owen-scrambled Sobol' points or independent random numbers.
-/// hide_env : bool, default False
-///     Hide the background.
-/// adaptive : bool, default True
-///     Take more samples in noisier pixels, with 'product'.
-/// target_error : float, optional
-///     Stop each tile when two sets of its samples indicate at most this relMSE, such as 1e-3, but not before 16
-///     samples.
-/// tile_size : int, optional
-///     Pixels along a tile's edge; 16 by default, 64 for functions. Only 'product' depends on it.
-/// passes : {'efficient', 'doubling'}, default 'efficient'
-///     The division of samples into passes: as suits the strategy best, or 1, 1, 2, 4, …, like `--passes doubling` of
-///     the program. Only 'product' depends on it.
-/// time : float, optional
-///     Stop after this many seconds of rendering; `film.complete` tells whether all samples were taken.
-/// progress : bool or callable, default False
-///     True shows a bar if tqdm is installed; a callable receives the finished fraction, in [0, 1], every hundredth of
-///     a second.
-///
-/// Returns
-/// -------
-/// Film
-///     Bit-identical to the program's for the same settings.
-///
-/// Raises
-/// ------
-/// ValueError
-///     If a setting is invalid; the message names it.
-/// RenderInterrupted
-///     A `KeyboardInterrupt` whose attribute `film` holds the samples so far.
-///
-/// Warns
-/// -----
-/// DomelightWarning
-///     If samples were NaN or infinite.
-#[pyfunction(name = "_render")]
-#[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = [640, 640], seed = 0, threads = None,
-    camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
-    tile_size = None, passes = "efficient", time = None, progress = None),
-    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, passes='efficient', time=None, progress=None)")]
+/// A film; `domelight.render` documents it.
+#[pyfunction]
 pub(crate) fn render<'py>(
     py: Python<'py>,
     scene: &Bound<'py, Scene>,
     env: Option<&Bound<'py, Environment>>,
-    strategy: Option<Bound<'py, PyAny>>,
-    spp: u32,
-    size: [i64; 2],
-    seed: u64,
+    strategy: Bound<'py, PyAny>,
+    options: &Bound<'py, PyDict>,
     threads: Option<usize>,
     camera: Option<CameraLike>,
-    filter: &str,
-    sampler: &str,
-    hide_env: bool,
-    adaptive: bool,
-    target_error: Option<f32>,
     tile_size: Option<usize>,
-    passes: &str,
     time: Option<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Film> {
     let time = time.map(duration).transpose()?;
-    let strategy = strategy.unwrap_or_else(|| pyo3::types::PyString::new(py, "product").into_any());
-    let keywords = Keywords {
-        strategy,
-        spp,
-        size,
-        seed,
-        threads,
-        camera,
-        filter,
-        sampler,
-        hide_env,
-        adaptive,
-        target_error,
-        tile_size,
-        passes,
-    };
-    let job = &Job::new(py, scene.get(), env, keywords)?;
+    let arguments = Arguments { job: options::job(options)?, strategy, threads, camera, tile_size };
+    let setup = &RenderSetup::new(py, scene.get(), env, arguments)?;
     let done = &AtomicU64::new(0);
     let report = |py: Python<'_>| match &progress {
-        Some(progress) => progress.bind(py).call1((job.share(done),)).map(drop),
+        Some(progress) => progress.bind(py).call1((setup.share(done),)).map(drop),
         None => Ok(()),
     };
     let (result, stopped) = py.detach(|| {
         std::thread::scope(|scope| {
             let (sender, results) = mpsc::channel();
             scope.spawn(move || {
-                let rendered = job.pool().and_then(|pool| {
-                    let watch = Watch { job, done, end: None };
-                    let visitor = ToTheEnd { job, watch, time };
-                    caught(|| pool.install(|| job.with_renderer(visitor)))?
+                let rendered = setup.pool().and_then(|pool| {
+                    let watch = Watch { setup, done, end: None };
+                    let visitor = ToTheEnd { setup, watch, time };
+                    caught(|| pool.install(|| setup.with_renderer(visitor)))?
                 });
                 // The receiver is still waiting.
                 let _ = sender.send(rendered);
             });
-            wait(&results, job.failure().canceled(), &report)
+            wait(&results, setup.failure().canceled(), &report)
         })
     })?;
-    if let Some(error) = job.failure().take() {
+    if let Some(error) = setup.failure().take() {
         return Err(error);
     }
     let film = result?;
@@ -571,7 +435,7 @@ pub(crate) fn render<'py>(
         return Err(interrupted(py, error, film)?);
     }
     if film.complete {
-        done.store(job.total_samples(), Ordering::Relaxed);
+        done.store(setup.total_samples(), Ordering::Relaxed);
         report(py)?;
     }
     warn_of(py, &film)?;

@@ -9,7 +9,6 @@ use domelight::environment::UpAxis;
 use domelight::environment::io::ProbeOptions;
 use domelight::geometry::{Aabb, Mesh};
 use domelight::math::{DVec3, Vec2, Vec3};
-use domelight::picture::MAX_TEXELS;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
     self, AnimationTime, CameraError, CameraSettings, EnvironmentSettings, EnvironmentSource,
@@ -815,15 +814,4 @@ fn attribute<const K: usize>(
         Ok((rows, &[found])) if found == n => Ok(rows.to_vec()),
         _ => Err(floats.bad_shape(&format!("({n}, {K}), a row for each vertex"))),
     }
-}
-
-/// A picture's width and height.
-pub(crate) fn size([width, height]: [i64; 2]) -> PyResult<(usize, usize)> {
-    let positive = |n: i64| usize::try_from(n).ok().filter(|&n| n > 0);
-    let area = |(w, h): &(usize, usize)| w.checked_mul(*h).is_some_and(|area| area <= MAX_TEXELS);
-    positive(width).zip(positive(height)).filter(area).ok_or_else(|| {
-        bad_value(format!(
-            "size is ({width}, {height}); width and height must be positive, and their product at most {MAX_TEXELS}"
-        ))
-    })
 }

@@ -1,7 +1,9 @@
 """Whatever comes in, what comes out is a result or an exception that says what is wrong."""
 
+import inspect
+import json
 import re
-from typing import get_args
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import domelight as dl
-from domelight import _names
+from domelight import _domelight, _names, _options
 
 ENV = dl.Environment(np.random.default_rng(3).random((6, 12, 3)))
 BSDF = dl.Bsdf.parse("ggx:0.3")
@@ -174,12 +176,17 @@ def test_messages_name_the_argument(env):
             function(*args, **kwargs)
 
     for render in (dl.render, dl.progressive):
-        refused(r"size is 8; it must be \(width, height\)", render, SPHERE, env, size=8)
-        refused(r"size is \(8, 8, 3\)", render, SPHERE, env, size=(8, 8, 3))
-        refused(r"size is \(8.5, 8\)", render, SPHERE, env, size=(8.5, 8))
-        refused(r"spp is -1; it must be a whole number from 1 to 16777216", render, SPHERE, env, spp=-1)
-        refused(r"spp is 2.5", render, SPHERE, env, spp=2.5)
-        refused(r"seed is -3", render, SPHERE, env, seed=-3)
+        refused(r"size: '8' is not a size such as", render, SPHERE, env, size=8)
+        refused(r"size: '8,8,3' is not a size", render, SPHERE, env, size=(8, 8, 3))
+        refused(r"size: '8.0,8' is not a size", render, SPHERE, env, size=(8.0, 8))
+        refused(r"size: '0,4' is not a size", render, SPHERE, env, size=np.array([0, 4]))
+        refused(r"spp: '-1' is not a whole number from 1 to 16777216", render, SPHERE, env, spp=-1)
+        refused(r"spp: '2.0' is not a whole number", render, SPHERE, env, spp=2.0)
+        refused(r"spp: invalid type: null", render, SPHERE, env, spp=None)
+        refused(r"seed: '-3' is not a whole number", render, SPHERE, env, seed=-3)
+        refused(r"target_error: 'nan' is not a number above 0", render, SPHERE, env, target_error=float("nan"))
+        refused(r"hide_env: invalid type", render, SPHERE, env, hide_env="yes")
+        refused(r"\(\) has no argument 'samples'", render, SPHERE, env, samples=3, error=TypeError)
         refused(r"1.5 is no camera; give a Camera", render, SPHERE, env, camera=1.5, error=TypeError)
     refused(r"strategies is 'mis'; it must be a list, such as \['mis'\]", dl.compare, SPHERE, env, "mis")
     refused(r"seeds is 0", dl.compare, SPHERE, env, ["mis"], seeds=0)
@@ -209,6 +216,30 @@ def refusal(call):
     return str(error.value)
 
 
+def test_the_options_for_type_checkers_are_those_of_jobs():
+    sections = {option["name"]: option["field"].split(".")[0] for option in json.loads(_domelight.job_options())}
+    pictures = {"size", "hide_env", *(name for name, section in sections.items() if section == "pixel")}
+    renders = {name for name, section in sections.items() if section == "sampling"} - {"strategy"}
+    assert set(get_type_hints(_options.PictureOptions)) == pictures
+    assert set(get_type_hints(_options.RenderOptions)) == pictures | renders
+
+
+def test_options_of_jobs_are_keywords():
+    parameters = inspect.signature(dl.render).parameters
+    assert [*parameters][:5] == ["scene", "env", "strategy", "size", "hide_env"]
+    assert (parameters["spp"].default, parameters["size"].default) == (32, (640, 640))
+    assert inspect.signature(dl.progressive).parameters["passes"].default == "doubling"
+    assert inspect.signature(dl.compare).parameters["size"].default == (256, 256)
+    assert "spp" not in inspect.signature(dl.inspect).parameters
+    for name in _options.RenderOptions.__annotations__:
+        assert f"\n{name} : " in inspect.getdoc(dl.render)
+    assert "seed : int, default 0\n    Seed of the random numbers; the same seed" in inspect.getdoc(dl.render)
+    numbers = {"size": np.array([4, 4]), "spp": np.int64(2), "seed": np.uint8(7), "hide_env": np.True_}
+    film = dl.render(SPHERE, ENV, target_error=np.float32(0.1), **numbers)
+    same = dl.render(SPHERE, ENV, size=[4, 4], spp=2, seed=7, hide_env=True, target_error=0.1)
+    assert np.array_equal(film.color, same.color) and film.color.shape == (4, 4, 3)
+
+
 def test_the_names_for_type_checkers_are_those_of_the_engine():
     tiny = {"spp": 1, "size": (2, 2)}
     picture = np.ones((2, 2, 3))
@@ -225,5 +256,5 @@ def test_the_names_for_type_checkers_are_those_of_the_engine():
             use(name)
         # The message ends with all that the engine knows.
         message = refusal(lambda use=use: use("velvet"))
-        listed = set(re.findall(r"[a-z-]+", re.split(r" (?:are|be) ", message)[-1]))
+        listed = set(re.findall(r"[a-z-]+", re.split(r" (?:are|be|one of) ", message)[-1]))
         assert listed - {"and", "or"} == set(known), message

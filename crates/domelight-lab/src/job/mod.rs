@@ -10,6 +10,7 @@
 
 mod file;
 mod light;
+mod options;
 mod output;
 mod sampling;
 mod subject;
@@ -28,6 +29,7 @@ pub use file::FilePart;
 pub(crate) use file::load_scene;
 pub use light::Light;
 pub(crate) use light::probe_name;
+pub use options::{JobOption, options};
 pub use output::Tone;
 pub use sampling::{Pixel, Sampling};
 pub use subject::{NamedMaterial, Subject};
@@ -201,10 +203,7 @@ impl Job {
             let Some(value) = values.get(id).filter(|value| usual.get(id) != Some(*value)) else {
                 continue;
             };
-            let text = match value {
-                Value::String(text) => text.clone(),
-                value => value.to_string(),
-            };
+            let text = text_of(value);
             match (argument.get_long(), argument.get_action()) {
                 (Some(long), ArgAction::SetTrue | ArgAction::SetFalse) => {
                     words.push(format!("--{long}"));
@@ -216,6 +215,14 @@ impl Job {
         }
         words.append(&mut positional);
         words
+    }
+
+    /// The names and texts of the options that decide what each camera sample is, of those that are said.
+    pub fn of_samples(&self) -> Vec<(String, String)> {
+        let Self { sampling, pixel, .. } = self;
+        let options = fields(sampling).into_iter().chain(fields(pixel));
+        let decides = |(name, _): &(String, Value)| name != "spp";
+        options.filter(decides).map(|(name, value)| (name, text_of(&value))).collect()
     }
 
     /// This job with the options that are `given` in `other` instead. An option that contradicts one of them goes.
@@ -308,6 +315,14 @@ fn sections() -> Vec<String> {
         return Vec::new();
     };
     sections.into_iter().map(|(name, _)| name).collect()
+}
+
+/// The text of an option's value.
+fn text_of(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        value => value.to_string(),
+    }
 }
 
 /// The fields that are said, by `section.name`.

@@ -303,10 +303,11 @@ impl<const MIN: u32, const MAX: u32> JsonSchema for Count<MIN, MAX> {
 pub struct Seed(pub u64);
 
 impl FromStr for Seed {
-    type Err = std::num::ParseIntError;
+    type Err = BadValue;
 
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        text.parse().map(Self)
+    fn from_str(text: &str) -> Result<Self, BadValue> {
+        let expected = "a whole number from 0 to 18446744073709551615";
+        text.parse().map(Self).map_err(|_| BadValue::new(text, expected))
     }
 }
 

@@ -18,7 +18,7 @@ use crate::depth_of_field::DepthOfField;
 #[command(next_help_heading = "Camera")]
 #[serde(default, deny_unknown_fields)]
 pub struct View {
-    /// Picture size
+    /// Width and height of the picture
     #[arg(id = "view.size", long = "size", value_name = "WxH", default_value = "640x640")]
     pub size: Text<Size>,
     /// Camera of the scene, by name or by number from 0 [default: the first]

@@ -24,21 +24,3 @@ def pair(name: str, value: Any, of: str) -> tuple[int, int]:
     except (TypeError, ValueError):
         raise ValueError(f"{name} is {value!r}; it must be ({of}), two whole numbers") from None
     return first, second
-
-
-MOST_SAMPLES = 1 << 24
-
-
-def spp(value: Any, name: str = "spp") -> int:
-    """Camera samples per pixel."""
-    return whole(name, value, 1, MOST_SAMPLES)
-
-
-def size(value: Any) -> tuple[int, int]:
-    """Width and height of a picture."""
-    return pair("size", value, "width, height")
-
-
-def seed(value: Any) -> int:
-    """The seed of random numbers."""
-    return whole("seed", value, 0, (1 << 64) - 1)

@@ -13,10 +13,14 @@ import numpy.typing as npt
 
 from . import _arguments, _domelight
 from ._inspect import named
+from ._options import PICTURE, takes
 from ._progress import bar, callback
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from ._domelight import Camera, Environment, Scene
+    from ._options import PictureOptions
     from .strategies import Strategy
 
 
@@ -81,6 +85,7 @@ class Comparison:
         )
 
 
+@takes(PICTURE, size=(256, 256))
 def compare(
     scene: Scene,
     env: Environment | None = None,
@@ -89,13 +94,11 @@ def compare(
     budget: str = "rays:32",
     seeds: int = 4,
     reference_spp: int = 64,
-    size: tuple[int, int] = (256, 256),
-    seed: int = 0,
     threads: int | None = None,
     camera: Camera | str | int | None = None,
-    hide_env: bool = False,
     tile_size: int | None = None,
     progress: bool | Callable[[float, str], object] = False,
+    **options: Unpack[PictureOptions],
 ) -> Comparison:
     """Compare strategies at equal samples, shadow rays or time.
 
@@ -113,7 +116,7 @@ def compare(
         The number of pictures per strategy.
     reference_spp : int, default 64
         Camera samples per pixel of the rendered reference.
-    size, seed, threads, camera, hide_env, tile_size
+    **options, threads, camera, tile_size
         As in `render`; the default tile size is 16, also for functions.
     progress : bool or callable, default False
         True shows a bar if tqdm is installed; a callable receives the finished fraction, in [0, 1], and the name of the
@@ -142,12 +145,10 @@ def compare(
             named(strategies),
             budget,
             _arguments.whole("seeds", seeds, 1, 1000),
-            _arguments.spp(reference_spp, "reference_spp"),
-            _arguments.size(size),
-            _arguments.seed(seed),
+            _arguments.whole("reference_spp", reference_spp, 1, 1 << 24),
+            options,
             threads,
             camera,
-            hide_env,
             tile_size,
             report,
         )

@@ -7,7 +7,8 @@ from typing import Any, SupportsIndex, TypeAlias, final
 import numpy as np
 import numpy.typing as npt
 
-from ._names import Curve, Filter, Layer, Passes, Sampler, ShaderLanguage, Up, Window
+from ._names import Curve, Layer, ShaderLanguage, Up, Window
+from ._options import PictureOptions, RenderOptions
 from .metrics import Comparison
 from .strategies import Strategy
 from .testing import Chi2Report
@@ -311,44 +312,27 @@ class Rig:
     def save(self, path: _Path, *, format: str | None = None) -> None: ...
     def _repr_png_(self) -> bytes: ...
 
-def _render(
+def job_options() -> str: ...
+def render(
     scene: Scene,
-    env: Environment | None = None,
-    strategy: str | Strategy | None = None,
-    *,
-    spp: int = 32,
-    size: tuple[int, int] = (640, 640),
-    seed: int = 0,
-    threads: int | None = None,
-    camera: Camera | str | int | None = None,
-    filter: Filter = "gaussian",
-    sampler: Sampler = "sobol",
-    hide_env: bool = False,
-    adaptive: bool = True,
-    target_error: float | None = None,
-    tile_size: int | None = None,
-    passes: Passes = "efficient",
-    time: float | None = None,
-    progress: Callable[[float], object] | None = None,
+    env: Environment | None,
+    strategy: str | Strategy,
+    options: RenderOptions,
+    threads: int | None,
+    camera: Camera | str | int | None,
+    tile_size: int | None,
+    time: float | None,
+    progress: Callable[[float], object] | None,
 ) -> Film: ...
-def _progressive(
+def progressive(
     scene: Scene,
-    env: Environment | None = None,
-    strategy: str | Strategy | None = None,
-    *,
-    spp: int = 32,
-    size: tuple[int, int] = (640, 640),
-    seed: int = 0,
-    threads: int | None = None,
-    camera: Camera | str | int | None = None,
-    filter: Filter = "gaussian",
-    sampler: Sampler = "sobol",
-    hide_env: bool = False,
-    adaptive: bool = True,
-    target_error: float | None = None,
-    tile_size: int | None = None,
-    passes: Passes = "doubling",
-    progress: Callable[[float], object] | None = None,
+    env: Environment | None,
+    strategy: str | Strategy,
+    options: RenderOptions,
+    threads: int | None,
+    camera: Camera | str | int | None,
+    tile_size: int | None,
+    progress: Callable[[float], object] | None,
 ) -> Progressive: ...
 def compare(
     scene: Scene,
@@ -357,11 +341,9 @@ def compare(
     budget: str,
     seeds: int,
     reference_spp: int,
-    size: tuple[int, int],
-    seed: int,
+    options: PictureOptions,
     threads: int | None,
     camera: Camera | str | int | None,
-    hide_env: bool,
     tile_size: int | None,
     progress: Callable[[float, str], object] | None,
 ) -> dict[str, Any]: ...
@@ -370,11 +352,9 @@ def inspect(
     env: Environment | None,
     strategies: list[tuple[str, str | Strategy]],
     pixel: tuple[int, int],
-    size: tuple[int, int],
-    seed: int,
+    options: PictureOptions,
     threads: int | None,
     camera: Camera | str | int | None,
-    hide_env: bool,
     resolution: int,
 ) -> dict[str, Any]: ...
 def lights(

@@ -11,9 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arguments, _domelight
+from ._options import PICTURE, takes
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from ._domelight import Camera, Environment, Scene
+    from ._options import PictureOptions
     from .strategies import Strategy
 
 
@@ -172,18 +176,17 @@ def named(
     ]
 
 
+@takes(PICTURE)
 def inspect(
     scene: Scene,
     env: Environment | None = None,
     *,
     pixel: tuple[int, int],
     strategies: Sequence[str | Strategy] | Mapping[str, str | Strategy] = ("brdf", "environment", "mis", "product"),
-    size: tuple[int, int] = (640, 640),
-    seed: int = 0,
     threads: int | None = None,
     camera: Camera | str | int | None = None,
-    hide_env: bool = False,
     resolution: int = 64,
+    **options: Unpack[PictureOptions],
 ) -> Inspection:
     """Explain why a pixel is noisy, and how to reduce the noise.
 
@@ -197,7 +200,7 @@ def inspect(
         Column and row in a picture of `size`, from the upper left.
     strategies : sequence or mapping
         Strategies as in `render`; a mapping names them.
-    size, seed, threads, camera, hide_env
+    **options, threads, camera
         As in `render`.
     resolution : int, default 64
         Pixels along the edge of a map.
@@ -216,11 +219,9 @@ def inspect(
         env,
         named(strategies),
         _arguments.pair("pixel", pixel, "column, row"),
-        _arguments.size(size),
-        _arguments.seed(seed),
+        options,
         threads,
         camera,
-        hide_env,
         resolution,
     )
     found["strategies"] = [Decomposition(**s) for s in found["strategies"]]
