@@ -28,8 +28,8 @@ use crate::turntable::{Frame, Turntable};
 use domelight_lab::black;
 use domelight_lab::denoise::Denoiser;
 use domelight_lab::display::Display;
-use domelight_lab::job::Job;
 use domelight_lab::job::value::{Rotation, Size, Text};
+use domelight_lab::job::{Job, Sampling};
 use domelight_lab::names::file_name;
 use domelight_lab::scene::PreparedScene;
 use domelight_lab::{Stopwatch, refuse_repeating_points, warn_of_rare_acceptance};
@@ -92,19 +92,13 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let described = Settings {
         job: keeps_job.then(attributes).unwrap_or_default(),
         scene: report.clone(),
-        strategy: spec.description(),
-        spp: settings.n_samples,
-        adaptive: settings.adapts(strategy),
-        target_error: settings.target_error,
-        passes: settings.passes.name(),
-        sampler: settings.sampler.name(),
-        filter: settings.filter.name(),
-        seed: settings.seed,
+        sampling: Sampling { adaptive: settings.adapts(strategy), ..made.sampling.clone() },
+        pixel: made.pixel.clone(),
         threads: rayon::current_num_threads(),
         automatic_exposure: automatic.stops,
     };
     let render_run = &arguments.render_run;
-    let render_run = render_run.render_run(view, settings, &described, spec, &outputs, quiet)?;
+    let render_run = render_run.render_run(view, settings, &made, &described, &outputs, quiet)?;
     let build = watch.lap();
     drop(loading);
 

@@ -11,10 +11,10 @@ mod timed;
 
 use anyhow::{Context as _, Result};
 use domelight::render::{
-    Checkpoint, Counts, Layers, Observer, Passes, RenderSettings, Renderer, Rendering, Stage,
-    TileView, Tiling,
+    Checkpoint, Counts, Layers, Observer, RenderSettings, Renderer, Rendering, Stage, TileView,
+    Tiling,
 };
-use domelight::strategy::{Strategy, StrategySpec};
+use domelight::strategy::Strategy;
 
 use crate::args::render_run::RenderRunArguments;
 use crate::clock;
@@ -26,6 +26,7 @@ use crate::output::{PictureFormat, PicturePath};
 use crate::parse::{Shard, Tiles};
 use crate::progress::RenderProgress;
 use crate::report::Settings;
+use domelight_lab::job::Job;
 use domelight_lab::scene::PreparedScene;
 use timed::{Pace, PassWatch, TimeLimit};
 
@@ -103,8 +104,8 @@ impl RenderRunArguments {
         &self,
         view: &PreparedScene,
         settings: &RenderSettings,
+        job: &Job,
         report: &Settings,
-        strategy: StrategySpec,
         outputs: &[PicturePath],
         quiet: bool,
     ) -> Result<RenderRun> {
@@ -118,8 +119,7 @@ impl RenderRunArguments {
         let existing = part.clone().filter(|path| path.exists());
         let save = part.or_else(|| self.checkpoint.clone()).or_else(|| self.resume.clone());
         // Fingerprinting the scene and the environment takes time.
-        let identity =
-            if save.is_some() { identity(view, settings, report, strategy) } else { Vec::new() };
+        let identity = if save.is_some() { identity(view, settings, job) } else { Vec::new() };
         let from = if let Some(path) = self.resume.clone().or(existing) {
             let checkpoint = read(&path)?;
             require_same(&path, &checkpoint, &identity)?;
@@ -143,32 +143,17 @@ fn same_file(a: &Path, b: &Path) -> bool {
 }
 
 /// Everything that decides the picture except the number of samples, by name.
-fn identity(
-    view: &PreparedScene,
-    settings: &RenderSettings,
-    report: &Settings,
-    strategy: StrategySpec,
-) -> Vec<(String, String)> {
-    let camera = &view.report.camera;
-    let mut identity = vec![
-        ("adaptive", settings.adaptive.to_string()),
+fn identity(view: &PreparedScene, settings: &RenderSettings, job: &Job) -> Vec<(String, String)> {
+    let of_inputs = [
         ("background", settings.background.name().to_owned()),
-        ("camera", serde_json::to_string(camera).unwrap_or_default()),
+        ("camera", serde_json::to_string(&view.report.camera).unwrap_or_default()),
         ("environment", view.environment.fingerprint().to_string()),
-        ("filter", settings.filter.name().to_owned()),
-        ("sampler", report.sampler.to_owned()),
         ("scene", view.scene.fingerprint().to_string()),
-        ("seed", settings.seed.to_string()),
-        ("size", format!("{}x{}", settings.width, settings.height)),
-        ("strategy", strategy.to_string()),
+        ("size", job.view.size.to_string()),
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
     ];
-    // As it was before there was a choice.
-    if settings.passes != Passes::default() {
-        identity.push(("passes", report.passes.to_owned()));
-    }
-    identity.extend(settings.target_error.map(|e| ("target-error", e.to_string())));
-    identity.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    let of_inputs = of_inputs.map(|(name, value)| (name.to_owned(), value));
+    of_inputs.into_iter().chain(job.of_samples()).collect()
 }
 
 /// Reads a checkpoint or a part.

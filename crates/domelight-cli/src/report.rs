@@ -2,6 +2,8 @@
 
 use anyhow::Result;
 use domelight::render::{Counts, Layers, Provenance, RenderSettings, Rendering};
+use domelight::strategy::StrategySpec;
+use domelight_lab::job::{Pixel, Sampling};
 use domelight_lab::report::SceneReport;
 use domelight_lab::{Acceptance, Host as _, Seconds, peak_memory};
 use serde::Serialize;
@@ -18,15 +20,11 @@ use crate::tone::{Shown, denoised_line};
 pub(crate) struct Settings {
     #[serde(flatten)]
     pub(crate) scene: SceneReport,
-    pub(crate) strategy: String,
-    /// The number of camera samples per pixel: on average if `adaptive`, at most with a `target_error`.
-    pub(crate) spp: u32,
-    pub(crate) adaptive: bool,
-    pub(crate) target_error: Option<f32>,
-    pub(crate) passes: &'static str,
-    pub(crate) sampler: &'static str,
-    pub(crate) filter: &'static str,
-    pub(crate) seed: u64,
+    /// With the pilot's choices; `adaptive` only if the strategy adapts.
+    #[serde(flatten)]
+    pub(crate) sampling: Sampling,
+    #[serde(flatten)]
+    pub(crate) pixel: Pixel,
     pub(crate) threads: usize,
     /// The exposure by the light \[stops\].
     pub(crate) automatic_exposure: f32,
@@ -36,12 +34,16 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
+    fn strategy(&self) -> StrategySpec {
+        self.sampling.strategy.0.spec
+    }
+
     /// The provenance stored in OpenEXR files.
     pub(crate) fn provenance(&self, settings: &RenderSettings) -> Vec<(String, String)> {
         let provenance = Provenance {
             scene: &self.scene.scene,
             environment: self.scene.environment.probe(),
-            strategy: &self.strategy,
+            strategy: &self.strategy().description(),
             settings,
             exposure: self.automatic_exposure,
         };
@@ -154,13 +156,15 @@ impl RenderReport {
 
     /// Two lines on standard error.
     pub(crate) fn print_summary(&self) {
-        let Settings { scene, strategy, spp, target_error, .. } = &self.settings;
+        let Settings { scene, sampling, .. } = &self.settings;
+        let Sampling { spp, target_error, adaptive, .. } = sampling;
+        let strategy = self.settings.strategy().description();
         let SceneReport { scene, environment, size: [w, h], .. } = scene;
         let environment = environment.probe();
         let Timings { load, build, render, write, total } = &self.seconds;
         let up_to = if target_error.is_some() { "up to " } else { "" };
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
-        let taken = if self.settings.adaptive || target_error.is_some() {
+        let taken = if *adaptive || target_error.is_some() {
             format!(" ({:.1} taken)", self.samples_per_pixel)
         } else {
             String::new()

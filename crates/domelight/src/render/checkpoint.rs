@@ -54,8 +54,8 @@ pub enum CheckpointError {
     Damaged(&'static str),
 }
 
-/// The version of the format, which changes with the layout.
-const FORMAT: &str = "2";
+/// The version of the format, which changes with the layout and with the names of the identity.
+const FORMAT: &str = "3";
 
 /// The prefix of identity attributes.
 const IDENTITY: &str = "domelight.render.";
