@@ -893,7 +893,7 @@ fn promises_beyond_the_file_are_refused_before_memory_is_taken() {
 fn unknown_formats_are_named() {
     assert_eq!(
         decode(b"GIF89a").unwrap_err().to_string(),
-        "test: not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG, JPEG), by its first bytes"
+        "test: not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG, JPEG, KTX2, DDS), by its first bytes"
     );
     assert!(decode(b"").is_err());
 }

@@ -1,5 +1,6 @@
 //! Errors of picture files.
 
+use super::texture::TextureErrorKind;
 use crate::memory::OverLimit;
 use std::io;
 
@@ -26,7 +27,7 @@ pub enum PictureErrorKind {
     NoBytes,
     /// The first bytes belong to no known format.
     #[error(
-        "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG, JPEG), by its first bytes"
+        "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG, JPEG, KTX2, DDS), by its first bytes"
     )]
     UnknownFormat,
     /// An invalid header line.
@@ -125,6 +126,9 @@ pub enum PictureErrorKind {
     /// The picture needs more memory than [`super::ReadOptions::max_memory`] allows.
     #[error("{0}")]
     Memory(#[from] OverLimit),
+    /// A texture that is no cube of radiance, or damaged.
+    #[error("{0}")]
+    Texture(#[from] TextureErrorKind),
     /// A decoder of the `image` crate refused the file.
     #[error("{0}")]
     Image(image::ImageError),

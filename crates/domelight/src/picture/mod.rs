@@ -1,4 +1,4 @@
-//! Picture files: Radiance `.hdr`, OpenEXR, `.pfm`, PNG, JPEG (read only); exposure and tone curves.
+//! Picture files: Radiance `.hdr`, OpenEXR, `.pfm`, PNG, JPEG and cubes in KTX2 and DDS (read only); exposure and tone curves.
 //!
 //! The format is recognized by the first bytes, never by the name. Decoded pictures are linear Rec. 709, top row first.
 //! A header that promises more texels than the file can hold is rejected before memory is allocated. Truncated and
@@ -31,6 +31,7 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use texture::Container;
 
 /// The maximum number of texels of a picture that is read (2²⁹: 32768 × 16384).
 pub const MAX_TEXELS: usize = 1 << 29;
@@ -48,6 +49,10 @@ pub enum Format {
     Png,
     /// JPEG, interpreted as sRGB.
     Jpeg,
+    /// A cube in a KTX 2.0 file.
+    Ktx2,
+    /// A cube in a DDS file.
+    Dds,
 }
 
 /// The position of OpenEXR's data window, which is the picture, in the display window.
@@ -217,6 +222,8 @@ pub fn read_bytes(
         Some(Format::Hdr) => hdr::decode(bytes),
         Some(Format::Exr) => exr::decode(bytes, options.layer.as_deref()),
         Some(Format::Pfm) => pfm::decode(bytes).map(|image| Picture::opaque(image, Format::Pfm)),
+        Some(Format::Ktx2) => texture::decode(bytes, Container::Ktx2),
+        Some(Format::Dds) => texture::decode(bytes, Container::Dds),
         Some(format @ (Format::Png | Format::Jpeg)) => {
             png::decode_within(bytes, format, options.max_memory)
         }
@@ -236,6 +243,8 @@ pub fn memory_to_read(bytes: &[u8]) -> Result<u64, PictureErrorKind> {
         Some(Format::Hdr) => (hdr::texels(bytes)?, 24),
         Some(Format::Exr) => (exr::texels(bytes)?, 24),
         Some(Format::Pfm) => (pfm::texels(bytes)?, 12),
+        Some(Format::Ktx2) => (texture::texels(bytes, Container::Ktx2)?, 12),
+        Some(Format::Dds) => (texture::texels(bytes, Container::Dds)?, 12),
         Some(format @ (Format::Png | Format::Jpeg)) => (png::texels(bytes, format)?, 40),
         None => (0, 0),
     };
@@ -250,6 +259,8 @@ pub fn format_of(bytes: &[u8]) -> Option<Format> {
         [b'P', b'F' | b'f', b' ' | b'\t' | b'\r' | b'\n', ..] => Some(Format::Pfm),
         [0x89, b'P', b'N', b'G', ..] => Some(Format::Png),
         [0xff, 0xd8, 0xff, ..] => Some(Format::Jpeg),
+        [0xab, b'K', b'T', b'X', b' ', b'2', b'0', 0xbb, ..] => Some(Format::Ktx2),
+        [b'D', b'D', b'S', b' ', ..] => Some(Format::Dds),
         _ => None,
     }
 }

@@ -5,7 +5,8 @@
 
 use std::io::{self, Write};
 
-use super::{TexelFormat, Texture};
+use super::Texture;
+use super::{FaceBytes, TexelFormat, TextureErrorKind};
 
 /// «KTX 20», with the bytes that expose damage by text transfers.
 const IDENTIFIER: [u8; 12] = *b"\xabKTX 20\xbb\r\n\x1a\n";
@@ -53,6 +54,54 @@ pub fn encode(texture: &Texture, out: &mut dyn Write) -> io::Result<()> {
         at = offset + bytes.len();
     }
     Ok(())
+}
+
+/// The first level of a cube.
+///
+/// # Errors
+/// If the file is no cube of uncompressed radiance, or is damaged.
+pub(super) fn faces(bytes: &[u8]) -> Result<FaceBytes<'_>, TextureErrorKind> {
+    let word = |at: usize| super::word(bytes, at);
+    let number = word(12)?;
+    let format = TexelFormat::RADIANCE.into_iter().find(|&known| format(known).0 == number);
+    let format = format.ok_or_else(|| TextureErrorKind::Format {
+        kind: "vkFormat",
+        number,
+        at: 12,
+        name: vulkan_name(number),
+    })?;
+    let [columns, rows, depth, layers, n_faces] =
+        [word(20)?, word(24)?, word(28)?, word(32)?, word(36)?];
+    super::check_cube([20, 36], [columns, rows, depth], n_faces)?;
+    if layers > 1 {
+        return Err(TextureErrorKind::Layers { layers, at: 32 });
+    }
+    let scheme = word(44)?;
+    if scheme != 0 {
+        return Err(TextureErrorKind::Supercompressed { scheme, at: 44 });
+    }
+    // The index begins with level 0.
+    let [start, length] = [super::long(bytes, HEADER)?, super::long(bytes, HEADER + 8)?];
+    FaceBytes::new(bytes, format, columns as usize, start, length)
+}
+
+/// The columns of a face, from the header alone.
+pub(super) fn columns(bytes: &[u8]) -> Result<usize, TextureErrorKind> {
+    Ok(super::word(bytes, 20)? as usize)
+}
+
+/// The name of a format that cubes of radiance often have, but that is not read.
+const fn vulkan_name(number: u32) -> &'static str {
+    match number {
+        131 | 132 => " (BC1)",
+        143 => " (BC6H)",
+        144 => " (BC6H, signed)",
+        145 | 146 => " (BC7)",
+        37 | 43 => " (RGBA8)",
+        122 => " (B10G11R11)",
+        0 => " (a universal texture)",
+        _ => "",
+    }
 }
 
 /// The number of a `VkFormat`, and the size of its machine words.

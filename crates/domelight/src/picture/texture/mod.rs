@@ -1,8 +1,15 @@
-//! Textures as graphics interfaces take them: cubes with a chain of levels and tables, in KTX2 and DDS files (written
-//! only).
+//! Textures as graphics interfaces take them: cubes with a chain of levels and tables, in KTX2 and DDS files.
+//!
+//! Of cubes, the first level is read: radiance in RGB9E5, half or single precision.
 
 pub mod dds;
+mod faces;
 pub mod ktx2;
+mod read;
+
+pub use faces::TextureErrorKind;
+use faces::{FaceBytes, check_cube, long, word};
+pub(super) use read::{Container, decode, texels};
 
 use half::f16;
 
@@ -25,6 +32,9 @@ pub enum TexelFormat {
 }
 
 impl TexelFormat {
+    /// Those of radiance.
+    const RADIANCE: [Self; 3] = [Self::SharedExponent, Self::Half, Self::Single];
+
     /// The size of a texel in bytes.
     pub const fn bytes(self) -> usize {
         match self {
@@ -154,13 +164,18 @@ fn shared_exponent(texel: Rgb) -> u32 {
     r | g << 9 | b << 18 | (exponent as u32) << 27
 }
 
+/// The inverse of [`shared_exponent`], exact.
+fn from_shared_exponent(bits: u32) -> Rgb {
+    let unit = functions::powi(2f32, (bits >> 27) as i32 - 24);
+    Rgb::from([0, 9, 18].map(|shift| (bits >> shift & 511) as f32 * unit))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn decoded(bits: u32) -> [f64; 3] {
-        let unit = 2f64.powi((bits >> 27) as i32 - 24);
-        [0, 9, 18].map(|shift| f64::from(bits >> shift & 511) * unit)
+        from_shared_exponent(bits).to_array().map(f64::from)
     }
 
     #[test]
