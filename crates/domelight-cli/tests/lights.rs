@@ -345,3 +345,37 @@ fn help_shows_examples() {
     let output = domelight(&folder, &["lights", "--help"]);
     assert!(done(&output).contains("Examples:\n  domelight lights"), "{}", stdout(&output));
 }
+
+#[test]
+fn spherical_gaussians_in_both_formats() {
+    let folder = probes();
+    let arguments = ["lights", "sun.exr", "--sg", "6", "-o", "sg.npy", "-o", "sg.json", "--json"];
+    let report = json(&domelight(&folder, &arguments));
+    assert_eq!(report["has_sun"], true);
+    assert!(report["error"]["diffuse"].as_f64().is_some_and(|error| error < 0.01), "{report}");
+    let file = rig(&folder, "sg.json");
+    assert_eq!((&file["lobes"], &file["probe"]), (&report["lobes"], &"sun.exr".into()));
+    let bytes = std::fs::read(folder.path().join("sg.npy")).expect("a file");
+    let first = |i: usize| f32::from_le_bytes(bytes[128 + 4 * i..][..4].try_into().unwrap());
+    assert_eq!(bytes.len(), 128 + 6 * 7 * 4);
+    assert_eq!(file["lobes"][0][3].as_f64().map(|n| n as f32), Some(first(3)));
+    assert!(first(3) > 300.0, "the sun is sharp: {}", first(3));
+}
+
+#[test]
+fn bad_requests_for_spherical_gaussians_write_nothing() {
+    let folder = probes();
+    let before = files(&folder);
+    for (arguments, code, message) in [
+        (&["black.exr", "--sg", "2", "-o", "x.npy"][..], 1, "black"),
+        (&["sun.exr", "--sg", "0", "-o", "x.npy"], 2, "1..=1024"),
+        (&["sun.exr", "--sg", "2", "-o", "x.usda"], 2, ".npy or .json"),
+        (&["sun.exr", "--sg", "2", "-n", "3"], 2, "cannot be used with"),
+        (&["sun.exr", "--sg", "2", "-o", "sun.exr"], 2, "sun.exr"),
+    ] {
+        let output = domelight(&folder, &[&["lights"], arguments].concat());
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}");
+        assert!(stderr(&output).contains(message), "{arguments:?}: {}", stderr(&output));
+    }
+    assert_eq!(files(&folder), before);
+}

@@ -8,6 +8,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, Window, load_probe};
 use domelight::environment::mapping::{CubeFaces, Mapping};
 use domelight::environment::{self, EnvironmentDensity, EnvironmentSample, Orientation, UpAxis};
+use domelight::rig::SphericalGaussians;
 use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings};
 use domelight::{Rgb, RgbImage};
 use numpy::PyArrayDyn;
@@ -15,7 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
 
 use crate::arrays::{Floats, array, from_image, hashable, image, rows};
-use crate::engine::{abandonable, alone, parallel};
+use crate::engine::{abandonable, alone, parallel, parallel_on};
 use crate::error::{bad_value, from_source, to_python, warn};
 use crate::picture::{depth, to_png, tone};
 
@@ -462,6 +463,41 @@ impl Environment {
         let (width, groups) = (tables.texture_width(), tables.texture());
         let shape = [groups.len() / width, width, 4];
         array(py, groups.into_flattened(), &shape)
+    }
+
+    /// Fit spherical Gaussians to the light: radiance from w is the sum of amplitude * exp(sharpness * (axis . w - 1)).
+    ///
+    /// The fit minimizes the squared error of radiance over the sphere, and keeps the flux of each channel. The sun is a
+    /// lobe of its own, the first; the others follow in descending order of flux. With the map as Mitsuba looks it up
+    /// (`rotation=180`), axes are those of PhySG.
+    ///
+    /// Parameters
+    /// ----------
+    /// n : int, default 128
+    ///     Number of lobes, from 1 to 1024. There are fewer if the sun is all of the light.
+    /// threads : int, optional
+    ///     By default the cores available to the process. The lobes do not depend on it.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (n, 7)
+    ///     Axis x, y, z in the world, sharpness, amplitude red, green, blue [W m^-2 sr^-1], as `domelight lights --sg` writes it.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If the map is black, has fewer lit texels than lobes, or n is out of range.
+    #[pyo3(signature = (n = 128, *, threads = None), text_signature = "($self, n=128, *, threads=None)")]
+    fn spherical_gaussians<'py>(
+        &self,
+        py: Python<'py>,
+        n: usize,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let fitted = parallel_on(py, threads, || SphericalGaussians::fit(&self.inner, n))?;
+        let rows = fitted.map_err(to_python)?.rows();
+        let shape = [rows.len(), 7];
+        array(py, rows.into_flattened(), &shape)
     }
 
     fn __repr__(&self) -> String {

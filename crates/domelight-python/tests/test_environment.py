@@ -177,6 +177,27 @@ def test_a_signal_ends_the_wait_for_a_map():
         signal.signal(signal.SIGALRM, before)
 
 
+def test_spherical_gaussians_have_the_light_of_the_map():
+    texels = np.full((16, 32, 3), 0.5, np.float32)
+    texels[5, 20] = (900.0, 800.0, 700.0)
+    env = dl.Environment(texels)
+    lobes = env.spherical_gaussians(6, threads=1)
+    assert lobes.shape == (6, 7) and lobes.dtype == np.float32
+    np.testing.assert_allclose(np.linalg.norm(lobes[:, :3], axis=1), 1.0, rtol=1e-6)
+    assert lobes.min(axis=0)[3:].min() >= 0.0
+    sharpness, amplitude = lobes[:, 3:4].astype(float), lobes[:, 4:]
+    flux = (2 * np.pi * -np.expm1(-2 * sharpness) / sharpness * amplitude).sum(axis=0)
+    expected = (env.solid_angles[:, None, None] * texels).sum(axis=(0, 1))
+    np.testing.assert_allclose(flux, expected, rtol=1e-3)
+    # The sun comes first.
+    np.testing.assert_allclose(lobes[0, :3], env.directions(np.array([20.5 / 32, 5.5 / 16])), atol=1e-2)
+    with pytest.raises(ValueError, match="black"):
+        dl.Environment(np.zeros((2, 4, 3))).spherical_gaussians()
+    for n, message in [(0, "0 were requested"), (1025, "at most 1024")]:
+        with pytest.raises(ValueError, match=message):
+            env.spherical_gaussians(n)
+
+
 def test_shader_tables_are_those_of_the_program(env):
     tables = env.shader_tables(texels=64)
     assert tables.shape[2] == 4 and tables.dtype == np.float32

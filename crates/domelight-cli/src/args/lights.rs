@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::builder::TypedValueParser;
 use clap::{Args, ValueEnum};
 use domelight::rig::export::Format;
-use domelight::rig::{MedianCut, Method, VarianceMinimization};
+use domelight::rig::{MedianCut, Method, SphericalGaussians, VarianceMinimization};
 
 use super::{one_of, percent};
 use crate::output::PicturePath;
@@ -27,7 +27,9 @@ Examples:
   domelight lights chapel.hdr --error 5 -o rig.json -o rig.csv
       as many lights as a shading error of 5 % requires
   domelight lights sky --sun -n 16 -o - --format csv
-      the sun and 15 regions, to standard output";
+      the sun and 15 regions, to standard output
+  domelight lights venice.hdr --sg 128 -o venice.npy --env-convention mitsuba
+      128 spherical Gaussians in the axes of PhySG";
 
 /// Convert a light probe to a light rig.
 #[derive(Args, Debug)]
@@ -56,6 +58,12 @@ pub(crate) struct LightsArguments {
     /// Leave lights with a smaller share of the probe's light in the map [%; default: 0.1 for sun and lamps]
     #[arg(long, value_name = "PERCENT", help_heading = "Lights", value_parser = percent)]
     pub(crate) min_energy: Option<f64>,
+    /// Instead of lights, fit up to K spherical Gaussians for PhySG or NeRD: rows of axis, sharpness and RGB amplitude, written
+    /// as .npy or .json. The sun is a lobe of its own
+    #[arg(long, value_name = "K", help_heading = "Lights",
+          conflicts_with_all = ["n_lights", "error", "sun", "lamps", "method", "min_energy", "keep_residual", "preview", "format"],
+          value_parser = clap::value_parser!(u32).range(1..=SphericalGaussians::MOST as i64))]
+    pub(crate) sg: Option<u32>,
 
     /// Output file, whose extension sets the format; may be repeated; - is standard output
     #[arg(short, long = "output", value_name = "RIG", help_heading = "Output")]

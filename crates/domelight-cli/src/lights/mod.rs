@@ -1,5 +1,6 @@
 //! `domelight lights`: converts a probe to a light rig and a residual map.
 
+mod gaussians;
 mod preview;
 mod report;
 mod written;
@@ -38,6 +39,9 @@ const N_LIGHTS: usize = 64;
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
+    if let Some(n) = arguments.sg {
+        return gaussians::run(arguments, n as usize, quiet);
+    }
     let outputs = arguments.outputs()?;
     let preview = arguments.preview_path(&outputs, quiet);
     let dome_path = arguments.declare(&outputs, preview.as_deref())?;

@@ -4,9 +4,9 @@
 //! surface, ∫ L max(0, n·ω) dω, and for a glossy lobe, ∫ L max(0, n·ω)²⁰ dω, both of luminance. Shadows are
 //! excluded, because shadows of point lights stay hard and their error falls slowly with any method.
 
-use super::Rig;
 use super::regions::{Blocks, Metric};
 use super::texels::{Texels, unit};
+use super::{Rig, RigLight};
 use crate::environment::Environment;
 use crate::environment::lat_long::narrow_band;
 use crate::math::{TAU, Vec3, functions, vec3};
@@ -74,12 +74,17 @@ impl ShadingReference {
 
     /// The error of a rig that replaces the whole map.
     pub fn error(&self, rig: &Rig) -> ShadingError {
-        self.error_of(&self.shade(rig))
+        self.error_of(&self.shade(&rig.lights))
     }
 
     /// The error of a rig combined with a dome.
     pub fn error_beside(&self, rig: &Rig, dome: &Self) -> ShadingError {
-        let mut shaded = self.shade(rig);
+        self.error_of_lights(&rig.lights, dome)
+    }
+
+    /// The error of lights combined with a dome.
+    pub(super) fn error_of_lights(&self, lights: &[RigLight], dome: &Self) -> ShadingError {
+        let mut shaded = self.shade(lights);
         shaded.iter_mut().zip(&dome.exact).for_each(|(s, d)| {
             s.diffuse += d.diffuse;
             s.glossy += d.glossy;
@@ -87,9 +92,9 @@ impl ShadingReference {
         self.error_of(&shaded)
     }
 
-    fn shade(&self, rig: &Rig) -> Vec<Shading> {
-        let light = |l: &super::RigLight| (l.direction, f64::from(l.irradiance.luminance()));
-        let lights: Vec<_> = rig.lights.iter().map(light).collect();
+    fn shade(&self, lights: &[RigLight]) -> Vec<Shading> {
+        let light = |l: &RigLight| (l.direction, f64::from(l.irradiance.luminance()));
+        let lights: Vec<_> = lights.iter().map(light).collect();
         in_order(self.exact.len(), |i| shade(normal(i), &lights))
     }
 

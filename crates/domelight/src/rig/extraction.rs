@@ -140,6 +140,11 @@ impl<'a> CompactExtraction<'a> {
         Ok(Self { environment, settings, lights, sources, residual })
     }
 
+    /// The compact lights, and what they leave of the environment.
+    pub(super) fn into_parts(self) -> (Vec<RigLight>, Option<Environment>) {
+        (self.lights, self.residual)
+    }
+
     /// The number of compact sources found.
     pub fn n_compact(&self) -> usize {
         self.lights.len()

@@ -20,12 +20,15 @@ mod error;
 #[cfg(feature = "io")]
 pub mod export;
 mod extraction;
+mod geometry;
 pub mod ibl;
 mod median_cut;
 mod merge;
+mod pyramid;
 mod quadrature;
 mod regions;
 mod smallest;
+mod spherical_gaussians;
 mod spherical_harmonics;
 mod split;
 pub mod tables;
@@ -37,6 +40,7 @@ pub use extraction::{CompactExtraction, Extraction, ExtractionSettings, Method, 
 pub use median_cut::{LightPosition, MedianCut, median_cut};
 pub use quadrature::quadrature;
 pub use smallest::{SmallestRig, smallest_rig};
+pub use spherical_gaussians::{SphericalGaussian, SphericalGaussians};
 pub use spherical_harmonics::SphericalHarmonics;
 pub use split::Order;
 pub use variance_minimization::{Rule, VarianceMinimization, variance_minimization};
@@ -63,6 +67,12 @@ pub enum RigError {
         n_lights: usize,
         /// Texels with luminance.
         lit: usize,
+    },
+    /// More lobes than [`SphericalGaussians::MOST`].
+    #[error("{n_lobes} lobes were requested; there are at most {}", SphericalGaussians::MOST)]
+    TooManyLobes {
+        /// Lobes asked for.
+        n_lobes: usize,
     },
     /// No sun.
     #[error(

@@ -90,7 +90,12 @@ fn basis(w: Vec3) -> [f32; 9] {
 }
 
 /// The harmonics from ∫ L, ∫ L (x, y, z), ∫ L (x², y², z²) and ∫ L (xy, yz, xz).
-fn harmonics(sum: f64, first: [f64; 3], squares: [f64; 3], products: [f64; 3]) -> [f64; 9] {
+pub(super) fn harmonics(
+    sum: f64,
+    first: [f64; 3],
+    squares: [f64; 3],
+    products: [f64; 3],
+) -> [f64; 9] {
     let [y0, y1] = [(1.0 / (4.0 * PI)).sqrt(), (3.0 / (4.0 * PI)).sqrt()];
     let [y2, y20, y22] = [15.0 / (4.0 * PI), 5.0 / (16.0 * PI), 15.0 / (16.0 * PI)].map(f64::sqrt);
     let ([x, y, z], [xx, yy, zz], [xy, yz, xz]) = (first, squares, products);

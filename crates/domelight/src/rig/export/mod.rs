@@ -18,6 +18,7 @@ mod photometric;
 mod program;
 mod radiance;
 mod sibl;
+mod spherical_gaussians;
 mod text;
 mod three;
 mod unity;

@@ -15,10 +15,10 @@
 //! At the horizon, K has a kink. There, the error is bounded by the slope times the depth beyond the horizon, and all
 //! nodes of radius r along it, which cover 4πr sr, may err by [`HORIZON_TOLERANCE`] together.
 
-use super::geometry::Shape;
 use super::lobe::Lobe;
-use super::pyramid::{Node, Pyramid};
 use crate::math::{PI, Vec3};
+use crate::rig::geometry::Shape;
+use crate::rig::pyramid::{Node, Pyramid};
 use crate::simd::{Kernel, LANES, LaneMask as _, Lanes, Simd, SimdF32x8, SimdFloat, Vectors};
 
 /// The bound on the error of a node, as a fraction of what it adds.

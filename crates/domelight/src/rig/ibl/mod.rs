@@ -18,14 +18,13 @@ mod brdf;
 mod cube;
 mod engine;
 mod gather;
-mod geometry;
 mod lobe;
-mod pyramid;
 
 pub use brdf::{BrdfTable, TableTerms, split_sum};
 pub use cube::{Cube, CubeAxes};
 pub use engine::{Engine, UnknownEngine};
 
+use super::pyramid::Pyramid;
 use super::spherical_harmonics::SphericalHarmonics;
 use crate::Rgb;
 use crate::environment::mapping::{CubeLayout, Mapping, from_lat_long_turned};
@@ -35,7 +34,6 @@ use crate::parallel::in_order;
 use crate::simd::{InstructionSet, LANES, Lanes, dispatch};
 use gather::Gather;
 use lobe::Lobe;
-use pyramid::Pyramid;
 
 /// How an environment is prefiltered.
 #[derive(Clone, Debug, PartialEq)]
