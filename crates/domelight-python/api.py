@@ -17,7 +17,7 @@ PAGE = pathlib.Path(__file__).parents[2] / "docs" / "python-api.md"
 SECTIONS = {
     "Rendering": ["render", "progressive", "Film", "Progressive"],
     "Scenes": ["Scene", "Camera", "Material", "Bsdf"],
-    "Light": ["Environment", "Density", "shader_code", "lights", "Rig"],
+    "Light": ["Environment", "Density", "shader_code", "lights", "Rig", "prefilter", "PrefilteredLight"],
     "Strategies": ["strategy_names", "strategy", "ShadingPoints", "strategies"],
     "Comparing and inspecting": ["compare", "Comparison", "inspect", "Inspection"],
     "Pictures": ["read", "write", "tone_map", "metrics"],

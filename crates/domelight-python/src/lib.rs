@@ -11,6 +11,7 @@ mod environment;
 mod error;
 mod failure;
 mod film;
+mod ibl;
 mod inspect;
 mod lobe;
 mod metrics;
@@ -36,6 +37,7 @@ mod _domelight {
         environment::{Density, Environment, shader_code},
         error::{DomelightWarning, RenderInterrupted},
         film::Film,
+        ibl::{PrefilteredLight, prefilter},
         inspect::inspect,
         metrics::{compare_pictures, error_map, flip, hdr_flip},
         options::job_options,

@@ -12,3 +12,6 @@ Layer: TypeAlias = Literal[
 Up: TypeAlias = Literal["y", "z"]
 Window: TypeAlias = Literal["data", "display"]
 ShaderLanguage: TypeAlias = Literal["wgsl", "glsl", "hlsl", "slang", "cuda", "metal"]
+Engine: TypeAlias = Literal["three", "filament", "babylon", "godot", "bevy", "unreal"]
+Content: TypeAlias = Literal["radiance", "irradiance", "brdf"]
+Texels: TypeAlias = Literal["rgb9e5", "half"]
