@@ -80,11 +80,11 @@ impl BenchArguments {
 
 /// Rejects options that the suite does not use.
 fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
-    use Suite::{Kernels, Lecture, Probes, Rigs};
+    use Suite::{Interiors, Kernels, Lecture, Probes, Rigs};
     let BenchArguments { meshes, probes, materials, cases, strategies, vs, embree, .. } = arguments;
     let given: [(&str, bool, &[Suite]); 7] = [
         ("--meshes", !meshes.is_empty(), &[Probes]),
-        ("--probes", !probes.is_empty(), &[Probes, Rigs]),
+        ("--probes", !probes.is_empty(), &[Probes, Interiors, Rigs]),
         ("--materials", materials.is_some(), &[Probes]),
         ("--case", !cases.is_empty(), &[Probes]),
         ("--strategies", !strategies.is_empty(), &[Probes, Lecture]),

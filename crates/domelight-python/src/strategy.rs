@@ -424,6 +424,7 @@ fn weights(weight: &Bound<'_, PyAny>, lead: &[usize]) -> PyResult<Vec<Rgb>> {
 impl Strategy for PythonStrategy {
     type Pass = ();
     type Scratch = ();
+    type Findings = ();
 
     fn n_rays(&self) -> u32 {
         self.n_rays
@@ -439,4 +440,6 @@ impl Strategy for PythonStrategy {
             out.reset(tile.points.len());
         }
     }
+
+    fn findings(&self, (): &()) {}
 }

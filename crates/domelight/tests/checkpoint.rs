@@ -172,6 +172,7 @@ struct SlowStrategy {
 impl Strategy for SlowStrategy {
     type Pass = ();
     type Scratch = ();
+    type Findings = ();
 
     fn n_rays(&self) -> u32 {
         1
@@ -183,6 +184,8 @@ impl Strategy for SlowStrategy {
         self.calls.fetch_add(1, Ordering::Relaxed);
         out.reset(tile.points.len());
     }
+
+    fn findings(&self, (): &()) {}
 }
 
 /// Before no background tiles that see nothing keep no sums.

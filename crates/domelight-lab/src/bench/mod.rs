@@ -5,6 +5,7 @@ mod bound;
 mod cases;
 mod embree;
 mod fit;
+mod interiors;
 mod kernels;
 mod machine;
 mod mitsuba;
@@ -34,6 +35,8 @@ pub enum Suite {
     Kernels,
     /// Probes x meshes x materials: CPU time of each strategy to reach the same error
     Probes,
+    /// Rooms with windows: error times rays and time, with portals and without
+    Interiors,
     /// Light rigs: the time to extract them, and their shading error
     Rigs,
 }
@@ -123,6 +126,7 @@ impl Bench<'_> {
             Rows::Lecture(rows) => renders::run_lecture(self, rows),
             Rows::Kernels(rows) => kernels::run(self, rows),
             Rows::Probes(rows) => renders::run_probes(self, rows),
+            Rows::Interiors(rows) => interiors::run(self, rows),
             Rows::Rigs(rows) => rigs::run(self, rows),
         }
     }

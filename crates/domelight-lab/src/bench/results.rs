@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::Suite;
 use super::machine::Machine;
 use super::table::Table;
-use super::{kernels, renders, rigs};
+use super::{interiors, kernels, renders, rigs};
 use crate::{At as _, Error};
 
 /// Raised when a file of before can no longer be read.
@@ -40,6 +40,7 @@ pub(super) enum Rows {
     Lecture(Vec<renders::Row>),
     Kernels(Vec<kernels::Row>),
     Probes(Vec<renders::Row>),
+    Interiors(Vec<interiors::Row>),
     Rigs(Vec<rigs::Row>),
 }
 
@@ -58,6 +59,7 @@ impl Results {
                 Suite::Lecture => Rows::Lecture(Vec::new()),
                 Suite::Kernels => Rows::Kernels(Vec::new()),
                 Suite::Probes => Rows::Probes(Vec::new()),
+                Suite::Interiors => Rows::Interiors(Vec::new()),
                 Suite::Rigs => Rows::Rigs(Vec::new()),
             },
         }
@@ -115,6 +117,7 @@ impl Results {
             Rows::Lecture(rows) => renders::lecture_tables(rows),
             Rows::Probes(rows) => renders::tables(rows),
             Rows::Kernels(rows) => kernels::tables(rows),
+            Rows::Interiors(rows) => interiors::tables(rows),
             Rows::Rigs(rows) => rigs::tables(rows),
         }
     }

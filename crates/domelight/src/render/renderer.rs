@@ -304,10 +304,14 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let n_samples = samples.len() as u32;
         let shared = strategy.begin_pass(sampler, n_samples);
         let adaptive = settings.adapts(strategy);
-        let (mean_log, brightness) = (None, None);
-        let mut pass = Pass { n_samples, set, adaptive, mean_log, brightness, shared };
-        if adaptive && let Some(scouted) = scout(context, strategy, &pass) {
-            (pass.mean_log, pass.brightness) = (Some(scouted.mean_log), scouted.brightness);
+        let (mean_log, brightness, is_scouting) = (None, None, false);
+        let mut pass = Pass { n_samples, set, adaptive, mean_log, brightness, is_scouting, shared };
+        if strategy.n_rounds() > 1
+            && let Some((scouted, findings)) = scout(context, strategy, &pass)
+        {
+            pass.mean_log = adaptive.then_some(scouted.mean_log);
+            pass.brightness = scouted.brightness;
+            strategy.brief(&mut pass.shared, findings);
         }
         pass
     }

@@ -124,17 +124,18 @@ fn mean_log(scouts: &[Scout], n: u32) -> Option<f32> {
     Some(high)
 }
 
-/// Sends scouts over the picture; `None` if no scout sees the scene.
+/// Sends scouts over the picture, and returns the scale and what the strategy has learned in each window; `None` if no
+/// scout sees the scene.
 ///
 /// Scouts are windows of pixels, spread over the picture, with their own random numbers, because a scale that depends
 /// on a pixel's own samples would introduce bias. They are rendered twice: a few with the same number of samples in
 /// every pixel, which gives a first scale; then all of them with that scale, because a strategy that learns has less
-/// error with more samples to learn from.
+/// error with more samples to learn from. The first ones tell the others what they have found.
 pub(super) fn scout<S: Strategy>(
     context: &RenderContext,
     strategy: &S,
     pass: &Pass<S>,
-) -> Option<Scouted> {
+) -> Option<(Scouted, Vec<S::Findings>)> {
     /// The number of pixels of the picture per window. Scouts cost a fiftieth of the render, less for large pictures.
     const PIXELS_PER_WINDOW: usize = 20 * SCOUT_WINDOW * SCOUT_WINDOW;
     /// The minimum and maximum number of windows.
@@ -150,25 +151,39 @@ pub(super) fn scout<S: Strategy>(
     let context = &RenderContext { settings, filter: context.filter.clone(), ..*context };
     let sampler = Sampler::for_pass(settings.sampler, settings.seed, 0);
     let n_samples = (pass.n_samples / SAMPLES_DIVISOR).max(FEWEST_SAMPLES).min(pass.n_samples);
-    let shared = strategy.begin_pass(sampler, n_samples);
-    let mut pass = Pass { n_samples, mean_log: None, brightness: None, shared, ..*pass };
+    // Prepare it for as many samples as the picture's, because the findings are about its cells.
+    let shared = strategy.begin_pass(sampler, pass.n_samples);
+    let mut pass = Pass {
+        n_samples,
+        adaptive: true,
+        mean_log: None,
+        brightness: None,
+        is_scouting: true,
+        shared,
+        ..*pass
+    };
     // Second sets of samples count toward the budget, except with a target error, where they are passes of their own.
     let second_sets = if settings.target_error.is_none() { SECOND_SETS } else { 0.0 };
-    let scouts = |n: usize, pass: &Pass<S>| -> Vec<Scout> {
-        spread(width, height, SCOUT_WINDOW, n)
+    let scouts = |n: usize, pass: &Pass<S>| -> (Vec<Scout>, Vec<S::Findings>) {
+        let windows: Vec<(Vec<Scout>, S::Findings)> = spread(width, height, SCOUT_WINDOW, n)
             .into_par_iter()
             .map_init(Box::<Scratch<S>>::default, |scratch, window| {
                 Tile::new(window).render(context, strategy, pass, scratch, &());
-                Scout::of_window(scratch, second_sets).collect::<Vec<_>>()
+                let scouts = Scout::of_window(scratch, second_sets).collect();
+                (scouts, strategy.findings(scratch.of_strategy()))
             })
-            .flatten_iter()
-            .collect()
+            .collect();
+        let (scouts, findings): (Vec<_>, _) = windows.into_iter().unzip();
+        (scouts.concat(), findings)
     };
-    let first = Scouted::by(&scouts(FIRST, &pass), pass.n_samples)?;
+    let (first_scouts, first_findings) = scouts(FIRST, &pass);
+    let first = Scouted::by(&first_scouts, pass.n_samples)?;
     (pass.mean_log, pass.brightness) = (Some(first.mean_log), first.brightness);
+    strategy.brief(&mut pass.shared, first_findings);
     let [fewest, most] = N_WINDOWS;
     let n_windows = (width * height / PIXELS_PER_WINDOW).clamp(fewest, most);
-    Scouted::by(&scouts(n_windows, &pass), pass.n_samples)
+    let (scouts, findings) = scouts(n_windows, &pass);
+    Some((Scouted::by(&scouts, pass.n_samples)?, findings))
 }
 
 /// About `n` windows of `size` × `size` pixels, or as large as the picture allows, one at a random position in each

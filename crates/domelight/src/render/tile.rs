@@ -112,6 +112,11 @@ impl<S: Strategy> Scratch<S> {
         &self.batch.allocation
     }
 
+    /// That of the strategy.
+    pub(super) fn of_strategy(&self) -> &S::Scratch {
+        &self.of_strategy
+    }
+
     /// Whether each pixel of the last tile may see anything.
     pub(super) fn seen(&self) -> &[bool] {
         &self.batch.seen
@@ -135,6 +140,8 @@ pub(super) struct Pass<S: Strategy> {
     pub(super) mean_log: Option<f32>,
     /// The mean luminance of the picture's surfaces, in multiples of the strategy's unit, if it is known.
     pub(super) brightness: Option<f32>,
+    /// Whether the strategy is asked for what it has learned in the last round, too.
+    pub(super) is_scouting: bool,
     pub(super) shared: S::Pass,
 }
 
@@ -324,7 +331,7 @@ impl Tile {
             }
             batch.choose(|i, _| of_round(i));
             counts += self.sample(&strategy_context, round, pass.set, batch, of_strategy, observer);
-            if round + 1 < n_rounds {
+            if round + 1 < n_rounds || pass.is_scouting {
                 batch.learn(&strategy_context, of_strategy);
             }
             observer.stage_started(Stage::Sums);

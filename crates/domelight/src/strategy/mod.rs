@@ -316,6 +316,8 @@ pub trait Strategy: Sync {
     /// Scratch memory of a thread. It carries what is learned from round to round of a tile, but nothing
     /// from tile to tile. Passes are independent, so a render may be interrupted between them.
     type Scratch: Default;
+    /// What a window of scouts has taught; `()` for a strategy that learns nothing.
+    type Findings: Send;
 
     /// The number of rounds per tile: 1, or [`levels::N_LEVELS`].
     fn n_rounds(&self) -> u32 {
@@ -355,7 +357,8 @@ pub trait Strategy: Sync {
         out: &mut Contributions,
     );
 
-    /// Learns from the rays of a round, unless it was the last. `visibility` has the V in [0, 1] of each pushed ray.
+    /// Learns from the rays of a round, unless it was the last of a tile that nobody asks for its findings. `visibility`
+    /// has the V in [0, 1] of each pushed ray.
     fn learn(
         &self,
         _tile: &TileShading,
@@ -364,11 +367,19 @@ pub trait Strategy: Sync {
         _scratch: &mut Self::Scratch,
     ) {
     }
+
+    /// What the last tile has taught, which was a window of scouts: pixels that are rendered before the picture, with a
+    /// pass and random numbers of their own.
+    fn findings(&self, scratch: &Self::Scratch) -> Self::Findings;
+
+    /// Tells a pass what scouts have found. The windows are spread over the picture.
+    fn brief(&self, _pass: &mut Self::Pass, _findings: Vec<Self::Findings>) {}
 }
 
 impl<S: PointStrategy> Strategy for S {
     type Pass = ();
     type Scratch = S::Scratch;
+    type Findings = ();
 
     fn n_rays(&self) -> u32 {
         PointStrategy::n_rays(self)
@@ -394,4 +405,6 @@ impl<S: PointStrategy> Strategy for S {
     ) {
         self.sample_tile(tile, scratch, out);
     }
+
+    fn findings(&self, _: &S::Scratch) {}
 }

@@ -204,9 +204,10 @@ pub struct PreparedScratch {
 }
 
 impl Strategy for PreparedStrategy<'_> {
-    /// The pool of `product`; the other strategies share nothing.
-    type Pass = Option<product::LightSamplePool>;
+    /// What `product` shares; the other strategies share nothing.
+    type Pass = Option<product::ProductPass>;
     type Scratch = PreparedScratch;
+    type Findings = Option<product::Findings>;
 
     fn n_rounds(&self) -> u32 {
         each!(self, s => s.n_rounds())
@@ -253,8 +254,8 @@ impl Strategy for PreparedStrategy<'_> {
             Self::Environment(s) => s.push(&(), tile, round, &mut scratch.samples, out),
             Self::Mis(s) => s.push(&(), tile, round, &mut scratch.samples, out),
             Self::Product(s) => {
-                let pool = pass.as_ref().expect("product draws a pool for each pass");
-                s.push(pool, tile, round, &mut scratch.product, out);
+                let pass = pass.as_ref().expect("product prepares each pass");
+                s.push(pass, tile, round, &mut scratch.product, out);
             }
             Self::Rejection(s) => s.push(&(), tile, round, &mut scratch.rejection, out),
             Self::Sir(s) => s.push(&(), tile, round, &mut scratch.sir, out),
@@ -277,6 +278,24 @@ impl Strategy for PreparedStrategy<'_> {
             | Self::Rejection(_)
             | Self::Sir(_)
             | Self::Lights(_) => {}
+        }
+    }
+
+    fn findings(&self, scratch: &PreparedScratch) -> Self::Findings {
+        match self {
+            Self::Product(product) => Some(product.findings(&scratch.product)),
+            Self::Brdf(_)
+            | Self::Environment(_)
+            | Self::Mis(_)
+            | Self::Rejection(_)
+            | Self::Sir(_)
+            | Self::Lights(_) => None,
+        }
+    }
+
+    fn brief(&self, pass: &mut Self::Pass, findings: Vec<Self::Findings>) {
+        if let (Self::Product(product), Some(pass)) = (self, pass) {
+            product.brief(pass, findings.into_iter().flatten().collect());
         }
     }
 }

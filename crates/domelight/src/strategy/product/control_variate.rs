@@ -89,15 +89,17 @@ impl ControlVariate {
     }
 
     /// Weights the glossy part like strata against BRDF samples: a cell whose light is as dense as `share` times the
-    /// pixel's mean counts half.
+    /// pixel's mean counts half. `rms` is the factor of strata that scouts gave.
     #[inline(always)]
-    pub(super) fn balance<S: Simd>(&mut self, simd: S, cells: &Cells, share: f32) {
+    pub(super) fn balance<S: Simd>(&mut self, simd: S, cells: &Cells, rms: &CellArray, share: f32) {
         if self.tint.is_none() || share == 0.0 {
             return;
         }
-        let (one, share) = (simd.splat_f32x16(1.0), simd.splat_f32x16(share));
+        let share = simd.splat_f32x16(share);
         for pair in cells.pairs() {
-            let weight = one / (one + share * cells.inverse_radiance.pair(simd, pair));
+            let of_brdf = share * cells.inverse_radiance.pair(simd, pair);
+            let of_strata = rms.pair(simd, pair);
+            let weight = of_strata / (of_strata + of_brdf);
             for sum in &mut self.gloss {
                 sum.set_pair(pair, sum.pair(simd, pair) * weight);
             }
@@ -191,6 +193,7 @@ impl ControlVariate {
 
 #[cfg(test)]
 mod tests {
+    use super::super::briefing::Briefing;
     use super::super::candidates::{Candidates, Sources};
     use super::super::hits::{Groups, Hits};
     use super::super::light_samples::PassLength;
@@ -229,13 +232,19 @@ mod tests {
                 (ControlVariate::default(), Candidates::default());
             groups.cluster(hits);
             table.fill::<S, true>(simd, cells, &groups.all, &mut control_variate);
-            table.keep_product(simd, cells);
+            table.keep_product(simd, cells, &Briefing::default().rms);
             let (std_dev, is_glossy) = (self.visible, groups.is_glossy());
             let above = &control_variate.above;
             table.weight_by_visibility(simd, cells, above, (self.visible, std_dev), is_glossy);
             table.accumulate(simd, cells);
             let counts = Counts { light: 40, brdf: 4, portal: 0 };
-            control_variate.balance(simd, cells, groups.brdf_share(counts, table.product_total()));
+            let rms = &Briefing::default().rms;
+            control_variate.balance(
+                simd,
+                cells,
+                rms,
+                groups.brdf_share(counts, table.product_total()),
+            );
             let numbers = PixelSamples::new(Sampler::new(SamplerKind::Independent, self.seed, 0));
             let sources = Sources {
                 portals: Portals::new(&[]),

@@ -44,9 +44,9 @@ impl Kernel for TileEstimator<'_, '_> {
         let Self { tile, pilots, .. } = self;
         let blocks = tile.blocks();
         if !pilots {
-            let ProductScratch { visibility, visibility_stats, .. } = &mut *self.scratch;
+            let ProductScratch { visibility, visibility_stats, briefing, .. } = &mut *self.scratch;
             let has_portals = !tile.portals.is_empty();
-            visibility.estimate(simd, self.cells, visibility_stats, blocks, has_portals);
+            visibility.estimate(simd, self.cells, visibility_stats, briefing, blocks, has_portals);
         }
         self.scratch.targets.clear();
         self.scratch.sampled_pixels.clear();
@@ -105,16 +105,26 @@ impl TileEstimator<'_, '_> {
         points: &[ShadingPoint],
     ) {
         let cells = self.cells;
-        let ProductScratch { groups, table, control_variate, visibility, strata_share, .. } =
-            &mut *self.scratch;
+        let ProductScratch {
+            groups,
+            table,
+            control_variate,
+            visibility,
+            briefing,
+            strata_share,
+            ..
+        } = &mut *self.scratch;
         if self.pilots {
             table.fill::<S, false>(simd, cells, &groups.all, control_variate);
-            table.keep_product(simd, cells);
+            table.keep_product(simd, cells, &briefing.rms);
+            for pair in cells.pairs() {
+                table.scale(simd, pair, briefing.rms.pair(simd, pair));
+            }
             table.accumulate(simd, cells);
             return;
         }
         table.fill::<S, true>(simd, cells, &groups.all, control_variate);
-        table.keep_product(simd, cells);
+        table.keep_product(simd, cells, &briefing.rms);
         if counts.portal > 0 {
             let strata = counts.light as f32 / table.product_total().max(f32::MIN_POSITIVE);
             let portals = (Portals::new(self.tile.portals), counts.portal);
@@ -125,7 +135,8 @@ impl TileEstimator<'_, '_> {
         let (above, is_glossy) = (&control_variate.above, groups.is_glossy());
         table.weight_by_visibility(simd, cells, above, visibility.of(block), is_glossy);
         table.accumulate(simd, cells);
-        control_variate.balance(simd, cells, groups.brdf_share(counts, table.product_total()));
+        let brdf_share = groups.brdf_share(counts, table.product_total());
+        control_variate.balance(simd, cells, &briefing.rms, brdf_share);
     }
 
     /// The random numbers of a pixel in the pass.

@@ -57,7 +57,7 @@ const N_LIGHT_SAMPLES: usize = N_SLOTS * PER_CELL;
 
 /// The directions of all cells.
 #[derive(Clone, Debug)]
-pub struct LightSamplePool {
+pub(super) struct LightSamplePool {
     /// By slot.
     lights: Box<[LightSample; N_LIGHT_SAMPLES]>,
     /// Determines how many directions each slot holds, at its start.

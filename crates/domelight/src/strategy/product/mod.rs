@@ -32,6 +32,7 @@
 //! Sampling on CPU and GPU", learns visibility for the density.
 
 mod brdf_samples;
+mod briefing;
 mod candidate;
 mod candidates;
 mod cells;
@@ -48,7 +49,7 @@ mod table;
 mod test_support;
 mod visibility;
 
-pub use light_samples::LightSamplePool;
+pub use briefing::Findings;
 
 use std::borrow::Cow;
 
@@ -56,14 +57,16 @@ use super::levels::N_LEVELS;
 use super::{Contributions, PixelPoints, Strategy, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
+use crate::math::Vec3;
 use crate::sampling::Sampler;
 use crate::simd::{InstructionSet, dispatch};
+use briefing::{Briefing, Scouted};
 use candidates::Candidates;
 use cells::Cells;
 use control_variate::ControlVariate;
 use estimator::TileEstimator;
 use hits::Groups;
-use light_samples::PassLength;
+use light_samples::{LightSamplePool, PassLength};
 use portal_light::StrataShare;
 use strata::{CandidateIndex, Counts};
 use table::Table;
@@ -188,11 +191,22 @@ pub struct ProductScratch {
     /// The pixels of the round that have hits.
     sampled_pixels: Vec<usize>,
     visibility_stats: VisibilityStats,
+    briefing: Briefing,
+    /// The first point of each pixel of the tile that has any: their sum and number.
+    positions: (Vec3, usize),
+}
+
+/// What the tiles of a pass share.
+#[derive(Clone, Debug)]
+pub struct ProductPass {
+    pool: LightSamplePool,
+    scouted: Scouted,
 }
 
 impl Strategy for ProductSampling<'_> {
-    type Pass = LightSamplePool;
+    type Pass = ProductPass;
     type Scratch = ProductScratch;
+    type Findings = Findings;
 
     fn n_rounds(&self) -> u32 {
         N_LEVELS
@@ -210,15 +224,16 @@ impl Strategy for ProductSampling<'_> {
         Some((MAX_CANDIDATES / self.n_rays).clamp(1, SAMPLES_PER_PASS))
     }
 
-    fn begin_pass(&self, sampler: Sampler, n_samples: u32) -> LightSamplePool {
+    fn begin_pass(&self, sampler: Sampler, n_samples: u32) -> ProductPass {
         let length = PassLength::new(n_samples as usize);
         let draw = |cells| LightSamplePool::draw(cells, &self.environment, sampler, length);
-        self.cells(length).map_or_else(LightSamplePool::empty, draw)
+        let pool = self.cells(length).map_or_else(LightSamplePool::empty, draw);
+        ProductPass { pool, scouted: Scouted::default() }
     }
 
     fn push(
         &self,
-        pool: &LightSamplePool,
+        ProductPass { pool, scouted }: &ProductPass,
         tile: &TileShading,
         round: u32,
         scratch: &mut ProductScratch,
@@ -227,10 +242,16 @@ impl Strategy for ProductSampling<'_> {
         let Some(cells) = self.cells(pool.length) else { return };
         if round == 0 {
             scratch.visibility_stats.reset(tile.blocks(), tile.pixels.len());
+            scratch.positions = (Vec3::ZERO, 0);
         }
         if tile.points.is_empty() {
             scratch.sampled_pixels.clear();
             return;
+        }
+        if scratch.positions.1 == 0 {
+            let mean =
+                tile.points.iter().map(|at| at.position).sum::<Vec3>() / tile.points.len() as f32;
+            scratch.briefing.prepare(self.instruction_set, cells, scouted, mean);
         }
         let pilots = round == 0;
         let estimator = TileEstimator { strategy: self, cells, pool, tile, pilots, scratch, out };
@@ -245,11 +266,13 @@ impl Strategy for ProductSampling<'_> {
         scratch: &mut ProductScratch,
     ) {
         let blocks = tile.blocks();
-        let ProductScratch { visibility_stats, sampled_pixels, targets, .. } = scratch;
+        let ProductScratch { visibility_stats, sampled_pixels, targets, positions, .. } = scratch;
         let mut ray = 0;
         for &i in &*sampled_pixels {
             let PixelPoints { points, n_samples, .. } = &tile.pixels[i];
             let block = blocks.of(i % tile.width, i / tile.width);
+            positions.0 += tile.points[points.start].position;
+            positions.1 += 1;
             let mut sum: Rgb = pushed.base[points.clone()].iter().copied().sum();
             while pushed.point.get(ray).is_some_and(|&point| (point as usize) < points.end) {
                 let v = visibility[ray];
@@ -259,5 +282,13 @@ impl Strategy for ProductSampling<'_> {
             }
             visibility_stats.set_luminance(i, sum.luminance().max(0.0) / *n_samples as f32);
         }
+    }
+
+    fn findings(&self, scratch: &ProductScratch) -> Findings {
+        Findings::new(&scratch.visibility_stats, scratch.positions)
+    }
+
+    fn brief(&self, pass: &mut ProductPass, findings: Vec<Findings>) {
+        pass.scouted = Scouted::new(findings);
     }
 }

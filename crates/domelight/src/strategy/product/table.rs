@@ -22,10 +22,15 @@ use super::hits::Group;
 use super::strata::{Strata, StratumAssignment};
 use crate::bsdf::GlossyLobe;
 use crate::math::{FRAC_1_PI, Frame, Vec3, sqr};
-use crate::simd::{LANES, LaneMask, Simd, SimdF32x8, SimdFloat, SimdI32x8, Vectors};
+use crate::simd::{LANES, LaneMask, Simd, SimdF32x8, SimdF32x16, SimdFloat, SimdI32x8, Vectors};
 
 /// The minimum cosine of a cell that is not completely below the surface.
 const LEAST_COSINE: f32 = 0.01;
+/// The relative variance that the control variate leaves in the visible light of a cell of a glossy pixel.
+pub(super) const LEFT_OF_GLOSSY: f32 = 0.15;
+/// The part of a density that ignores visibility, over the rest of it. It bounds the weights of candidates in cells that
+/// are believed to be dark.
+pub(super) const BLIND: f32 = 0.1;
 
 /// A distribution over cells, by slot.
 #[derive(Clone, Debug)]
@@ -110,12 +115,14 @@ impl Table {
         }
     }
 
-    /// Keeps light times reflectance as the density that the balance heuristic assumes for strata.
+    /// Keeps light times reflectance, times what scouts tell about visibility, as the density that the balance heuristic
+    /// assumes for strata.
     #[inline(always)]
-    pub(super) fn keep_product<S: Simd>(&mut self, simd: S, cells: &Cells) {
+    pub(super) fn keep_product<S: Simd>(&mut self, simd: S, cells: &Cells, rms: &CellArray) {
         let mut sum = simd.splat(0.0);
         for row in cells.rows() {
-            let product = simd.load(&self.weight[row]) * simd.load(&cells.mass[row]);
+            let light = simd.load(&cells.mass[row]) * simd.load(&rms[row]);
+            let product = simd.load(&self.weight[row]) * light;
             self.product[row] = product.store();
             sum = sum + product;
         }
@@ -124,7 +131,7 @@ impl Table {
 
     /// Weights the table by the root mean square of what a candidate adds: the uncertainty of visibility, `std_dev`, and
     /// the part of the visible light that the control variate leaves. For diffuse pixels, this is light of cells across
-    /// the horizon.
+    /// the horizon. A small part of the density ignores visibility.
     #[inline(always)]
     pub(super) fn weight_by_visibility<S: Simd>(
         &mut self,
@@ -136,15 +143,22 @@ impl Table {
     ) {
         /// The relative variance that the control variate leaves in the light of a cell across the horizon.
         const ACROSS: f32 = 0.1;
-        /// The same for a cell of a glossy pixel.
-        const GLOSSY: f32 = 0.15;
         let one = |x| simd.splat_f32x16(x);
-        let [to_horizon, least] = if is_glossy { [0.0, GLOSSY] } else { [ACROSS, 0.0] };
+        let [to_horizon, least] = if is_glossy { [0.0, LEFT_OF_GLOSSY] } else { [ACROSS, 0.0] };
+        let (mut with, mut without) = (one(0.0), one(0.0));
+        let rms = &mut self.end;
         for pair in cells.pairs() {
             let left = (one(1.0) - above.pair(simd, pair)) * one(to_horizon) + one(least);
             let light = visible.pair(simd, pair).squared() * left;
-            let rms = (std_dev.pair(simd, pair).squared() + light).sqrt();
-            self.weight.set_pair(pair, self.weight.pair(simd, pair) * rms);
+            let of_cell = (std_dev.pair(simd, pair).squared() + light).sqrt();
+            rms.set_pair(pair, of_cell);
+            let product = self.weight.pair(simd, pair) * cells.mass.pair(simd, pair);
+            (with, without) = (with + product * of_cell, without + product);
+        }
+        let blind = one(BLIND * with.sum() / without.sum().max(f32::MIN_POSITIVE));
+        for pair in cells.pairs() {
+            let factor = self.end.pair(simd, pair) + blind;
+            self.weight.set_pair(pair, self.weight.pair(simd, pair) * factor);
         }
     }
 

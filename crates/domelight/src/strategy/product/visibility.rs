@@ -5,21 +5,23 @@
 //! neighbors 0.35, and rays to the two neighboring cells along the curve 0.25,
 //!
 //! ```text
-//! V̂ = (k + p)/(n + 1)        p = (K + v₀)/(N + 1)
-//! g² = V̂(1 − V̂) + (p(1 − p)/2 + 0.005)/(n + 1) + 0.0003
+//! V̂ = (k + p)/(n + 1)        p = (K + q)/(N + 1)        q = (K' + v₀)/(N' + 1)
+//! g² = V̂(1 − V̂) + (p(1 − p)/2 + 0.005 s)/(n + 1) + 0.0003 s        s = max(p, q)/0.1 within [0.003, 1]
 //! ```
 //!
-//! p is the visibility of the cell over the whole tile, with K of N rays unoccluded, and v₀ that of all cells. g is the
+//! p is the visibility of the cell over the whole tile, with K of N rays unoccluded, those of [scouts](super::briefing)
+//! among them; q that of the other cells in its group along the curve, and v₀ that of all cells. g is the
 //! standard deviation of a ray around V̂ combined with the uncertainty of V̂ itself, which is large if the tile's
-//! rays to the cell differ.
+//! rays to the cell differ, and small where neither the cell nor its group was ever seen: behind the walls of a room.
 //!
 //! V̂ is a control variate: the pixel's estimate is the light seen through V̂ that it reflects, plus Σ W (V − V̂)/π.
 //! Its expectation does not depend on V̂, provided that V̂ does not depend on the random numbers of strata and
 //! selection. For that reason, V̂ comes only from pixels of lower levels.
 
+use super::briefing::Briefing;
 use super::cells::{CellArray, Cells, MAX_ROWS, ZERO_CELLS, get_mut};
 use super::portal_light::PORTAL_ROW;
-use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat};
+use crate::simd::{LANES, Lanes, Simd, SimdF32x8, SimdFloat};
 
 /// The number of pixels along the side of a block.
 pub(super) const BLOCK: usize = 4;
@@ -28,13 +30,20 @@ const NEIGHBOR: f32 = 0.35;
 /// The weight of a ray to a neighboring cell.
 const BESIDE: f32 = 0.25;
 
+/// The number of cells along the curve that know about each other's visibility.
+const GROUP: usize = 16;
+/// The visibility below which cells are known to be dark.
+const DARK: f32 = 0.1;
+/// s of cells that nobody has seen.
+const LEAST_DOUBT: f32 = 0.003;
+
 /// The statistics of a tile.
 #[derive(Clone, Debug, Default)]
 pub(super) struct VisibilityStats {
     /// The number of rays traced from each block to each cell.
-    rays: Vec<CellArray>,
+    pub(super) rays: Vec<CellArray>,
     /// The number of unoccluded rays.
-    free: Vec<CellArray>,
+    pub(super) free: Vec<CellArray>,
     /// The luminance of each known pixel.
     luminance: Vec<Option<f32>>,
 }
@@ -118,6 +127,7 @@ impl VisibilityEstimate {
         simd: S,
         cells: &Cells,
         visibility_stats: &VisibilityStats,
+        briefing: &Briefing,
         blocks: Blocks,
         has_portals: bool,
     ) {
@@ -128,20 +138,19 @@ impl VisibilityEstimate {
         let (mut n, mut k) = (simd.splat(0.0), simd.splat(0.0));
         let mut tile = [[[0.0; LANES]; 2]; MAX_ROWS];
         for (row, [n_cells, k_cells]) in cells.rows().zip(&mut tile) {
-            let [n_row, k_row] = [sum(simd, rays, row), sum(simd, free, row)];
+            let [scouts_n, scouts_k] = briefing.counts.each_ref().map(|c| simd.load(&c[row]));
+            let n_row = sum(simd, rays, row) + scouts_n;
+            let k_row = sum(simd, free, row) + scouts_k;
             (n, k) = (n + n_row, k + k_row);
             (*n_cells, *k_cells) = (n_row.store(), k_row.store());
         }
-        let all = simd.splat((k.sum() + 1.0) / (n.sum() + 2.0));
-        let mut prior = [[0.0; LANES]; MAX_ROWS];
-        for row in cells.rows() {
-            let [n, k] = &tile[row];
-            prior[row] = ((simd.load(k) + all) / (simd.load(n) + one)).store();
-        }
-        let mut prior_of_portals = [0.0; LANES];
+        let all = (k.sum() + 1.0) / (n.sum() + 2.0);
+        let mut priors = [Prior::PORTAL; MAX_ROWS];
+        for_each_prior(simd, &tile[..n_rows], all, |row, prior| priors[row] = prior);
+        let mut of_portals = Prior::PORTAL;
         if let Some(row) = portals {
             let [n, k] = [sum(simd, rays, row), sum(simd, free, row)];
-            prior_of_portals = ((k + one) / (n + one)).store();
+            of_portals.visible = ((k + one) / (n + one)).store();
         }
         self.visible.resize(blocks.len(), ZERO_CELLS);
         self.std_dev.resize(blocks.len(), ZERO_CELLS);
@@ -151,12 +160,10 @@ impl VisibilityEstimate {
             for row in cells.rows().chain(portals) {
                 let n = around(simd, rays, block, &neighbors, row, n_rows);
                 let k = around(simd, free, block, &neighbors, row, n_rows);
-                let p = simd.load(prior.get(row).unwrap_or(&prior_of_portals));
-                let v = ((k + p) / (n + one)).min(one);
+                let prior = priors.get(row).unwrap_or(&of_portals);
+                let v = ((k + simd.load(&prior.visible)) / (n + one)).min(one);
                 visible[row] = v.store();
-                let differ = simd.splat(0.5) * p * (one - p) + simd.splat(0.005);
-                let unsure = simd.splat(0.0003) + differ / (n + one);
-                std_dev[row] = (v * (one - v) + unsure).sqrt().store();
+                std_dev[row] = prior.variance(simd, n, v).sqrt().store();
             }
         }
     }
@@ -164,6 +171,54 @@ impl VisibilityEstimate {
     /// V̂ of the cells from a block, and their standard deviations, by slot.
     pub(super) fn of(&self, block: usize) -> (&CellArray, &CellArray) {
         (&self.visible[block], &self.std_dev[block])
+    }
+}
+
+/// What the rays of a whole tile and its scouts say about the visibility of a row of cells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior {
+    /// p.
+    pub(super) visible: Lanes,
+    /// s.
+    doubt: Lanes,
+}
+
+impl Prior {
+    /// That of portals, which are meant to be seen.
+    const PORTAL: Self = Self { visible: [1.0; LANES], doubt: [1.0; LANES] };
+
+    /// g² of cells with visibility `v` by `n` rays.
+    #[inline(always)]
+    pub(super) fn variance<S: Simd>(&self, simd: S, n: S::F32x8, v: S::F32x8) -> S::F32x8 {
+        let one = simd.splat(1.0);
+        let (p, s) = (simd.load(&self.visible), simd.load(&self.doubt));
+        let differ = simd.splat(0.5) * p * (one - p) + simd.splat(0.005) * s;
+        v * (one - v) + (differ / (n + one) + simd.splat(0.0003) * s)
+    }
+}
+
+/// Calls `of_row` for each row of cells, with [N, K] in `counts`. `all` is v₀.
+#[inline(always)]
+pub(super) fn for_each_prior<S: Simd>(
+    simd: S,
+    counts: &[[Lanes; 2]],
+    all: f32,
+    mut of_row: impl FnMut(usize, Prior),
+) {
+    let (zero, one, all) = (simd.splat(0.0), simd.splat(1.0), simd.splat(all));
+    for (group, rows) in counts.chunks(GROUP).enumerate() {
+        let (mut n_group, mut k_group) = (zero, zero);
+        for [n, k] in rows {
+            (n_group, k_group) = (n_group + simd.load(n), k_group + simd.load(k));
+        }
+        for (i, [n, k]) in rows.iter().enumerate() {
+            let (n, k) = (simd.load(n), simd.load(k));
+            let others = ((k_group - k).max(zero) + all) / ((n_group - n).max(zero) + one);
+            let p = ((k + others) / (n + one)).min(one);
+            let doubt = (others.max(p) * simd.splat(1.0 / DARK)).max(simd.splat(LEAST_DOUBT));
+            let doubt = doubt.min(one).store();
+            of_row(group * GROUP + i, Prior { visible: p.store(), doubt });
+        }
     }
 }
 
@@ -219,7 +274,7 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> VisibilityEstimate {
             let mut visibility = VisibilityEstimate::default();
-            visibility.estimate(simd, self.0, self.1, self.2, false);
+            visibility.estimate(simd, self.0, self.1, &Briefing::default(), self.2, false);
             visibility
         }
     }

@@ -1,0 +1,233 @@
+//! The suite `interiors`: what the error of a room costs, in rays and in time, with portals and without.
+
+mod scenes;
+
+use domelight::Rgb;
+use domelight::bsdf::Bsdf;
+use domelight::environment::Environment;
+use domelight::render::{self, Background, Filter, RenderSettings};
+use domelight::scene::{Camera, Scene, SceneDescription};
+use domelight::strategy::{PreparedStrategy, StrategySpec};
+use serde::{Deserialize, Serialize};
+
+use super::Bench;
+use super::cases::{self, short};
+use super::table::{Table, number};
+use crate::usage::Stopwatch;
+use crate::{At as _, Error};
+use scenes::Interior;
+
+const SIZE: [usize; 2] = [128, 128];
+const MATERIALS: [&str; 2] = ["diffuse:0.7", "ggx:0.2"];
+/// Camera samples of the measured pictures.
+const SAMPLES: [u32; 2] = [4, 16];
+const STRATEGIES: [&str; 2] = ["mis:4:4", "product:4"];
+/// A reference's strategy, and the camera samples of each of its halves.
+const REFERENCE: &str = "product:8";
+const REFERENCE_SAMPLES: u32 = 1024;
+/// The first seed of a reference, which no measured picture has.
+const REFERENCE_SEED: u64 = 1 << 40;
+
+/// A scene, a probe, a material and a strategy.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Row {
+    scene: String,
+    probe: String,
+    material: String,
+    strategy: String,
+    /// Whether the strategy knows the scene's portals.
+    portals: bool,
+    samples: u32,
+    /// Mean over the seeds.
+    rel_mse: f64,
+    shadow_rays_per_pixel: f64,
+    /// Of one picture, scouts and preparation included.
+    cpu_seconds: f64,
+    /// The part of the error in the pixel that has most of it.
+    largest_pixel: f64,
+}
+
+pub(super) fn run(bench: &Bench, rows: &mut Vec<Row>) -> Result<(), Error> {
+    let environments = cases::environments(bench.settings, &[256], bench.host)?;
+    let n_cases = Interior::ALL.len() * environments.len() * MATERIALS.len();
+    let mut case = 0;
+    for interior in Interior::ALL {
+        for (probe, environment) in &environments {
+            for material in MATERIALS {
+                case += 1;
+                let name = format!("{} / {} / {material}", interior.name(), short(probe));
+                bench.host.status(&format!("case {case} of {n_cases}: {name}"));
+                let case = InteriorCase::new(bench, interior, environment, material)?;
+                for measured in case.measure(bench)? {
+                    let probe = short(probe).to_owned();
+                    rows.push(Row { probe, material: material.to_owned(), ..measured });
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A scene with and without portals under a probe, and what it looks like.
+struct InteriorCase<'a> {
+    interior: Interior,
+    environment: &'a Environment,
+    /// Without portals, and with them if it has any.
+    scenes: Vec<(Scene, Camera)>,
+    settings: RenderSettings,
+    halves: [Vec<Rgb>; 2],
+}
+
+impl<'a> InteriorCase<'a> {
+    fn new(
+        bench: &Bench,
+        interior: Interior,
+        environment: &'a Environment,
+        material: &str,
+    ) -> Result<Self, Error> {
+        let [width, height] = bench.settings.size.unwrap_or(SIZE);
+        let bsdf: Bsdf = material.parse().map_err(|e| Error::Usage(format!("{material}: {e}")))?;
+        let with = interior.describe(bsdf);
+        let without = SceneDescription { portals: Vec::new(), ..with.clone() };
+        let descriptions =
+            if with.portals.is_empty() { vec![without] } else { vec![without, with] };
+        let scenes = descriptions.into_iter().map(|description| {
+            let scene = Scene::new(description).at(interior.name())?;
+            let camera = Camera::framing(&scene, width, height);
+            Ok((scene, camera))
+        });
+        let settings = RenderSettings {
+            width,
+            height,
+            filter: Filter::Box,
+            background: Background::Hidden,
+            ..RenderSettings::default()
+        };
+        let mut case = Self {
+            interior,
+            environment,
+            scenes: scenes.collect::<Result<_, Error>>()?,
+            settings,
+            halves: [Vec::new(), Vec::new()],
+        };
+        let best = case.scenes.len() - 1;
+        for half in 0..2 {
+            bench.host.check_canceled()?;
+            let seed = REFERENCE_SEED + half as u64;
+            let reference = case.render(best, REFERENCE, REFERENCE_SAMPLES, seed)?;
+            case.halves[half] = reference.layers.color.pixels;
+        }
+        Ok(case)
+    }
+
+    fn render(
+        &self,
+        scene: usize,
+        strategy: &str,
+        n_samples: u32,
+        seed: u64,
+    ) -> Result<render::Rendering, Error> {
+        let (scene, camera) = &self.scenes[scene];
+        let settings = RenderSettings { n_samples, seed, ..self.settings };
+        let spec: StrategySpec =
+            strategy.parse().map_err(|e| Error::Usage(format!("{strategy}: {e}")))?;
+        let spec = spec.for_picture(scene, camera, self.environment, &settings);
+        let strategy = PreparedStrategy::new(spec, self.environment)?;
+        Ok(render::render(scene, camera, self.environment, &strategy, &settings, &()))
+    }
+
+    fn measure(&self, bench: &Bench) -> Result<Vec<Row>, Error> {
+        let mut rows = Vec::new();
+        for samples in SAMPLES {
+            for strategy in STRATEGIES {
+                // Only this strategy uses portals.
+                let n_scenes = if strategy.starts_with("product") { self.scenes.len() } else { 1 };
+                for scene in 0..n_scenes {
+                    rows.push(self.measure_one(bench, strategy, scene, samples)?);
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    fn measure_one(
+        &self,
+        bench: &Bench,
+        strategy: &str,
+        scene: usize,
+        samples: u32,
+    ) -> Result<Row, Error> {
+        let n_seeds = bench.settings.n_seeds;
+        let mut errors = vec![0.0; self.halves[0].len()];
+        let (mut rays, mut cpu_seconds) = (0.0, 0.0);
+        for seed in 0..u64::from(n_seeds) {
+            bench.host.check_canceled()?;
+            let mut watch = Stopwatch::start();
+            let rendering = self.render(scene, strategy, samples, bench.settings.seed + seed)?;
+            let time = watch.lap();
+            cpu_seconds += time.cpu.unwrap_or(time.wall) / f64::from(n_seeds);
+            rays += rendering.counts.shadow_rays as f64;
+            self.add_errors(&rendering.layers.color.pixels, &mut errors);
+        }
+        let n = errors.len() as f64;
+        let sum: f64 = errors.iter().sum();
+        let largest = errors.iter().copied().fold(0.0, f64::max);
+        Ok(Row {
+            scene: self.interior.name().to_owned(),
+            probe: String::new(),
+            material: String::new(),
+            strategy: strategy.to_owned(),
+            portals: scene > 0,
+            samples,
+            rel_mse: sum / n / f64::from(n_seeds),
+            shadow_rays_per_pixel: rays / n / f64::from(n_seeds),
+            cpu_seconds,
+            largest_pixel: largest / sum,
+        })
+    }
+
+    /// Adds (I − A)(I − B)/(R² + (mean/10)²) of each pixel, where A and B are the halves of the reference and R is their
+    /// mean luminance. The noise of one half has nothing to do with that of the other, so it does not count as error.
+    fn add_errors(&self, picture: &[Rgb], errors: &mut [f64]) {
+        let [a, b] = &self.halves;
+        let luminance = |(a, b): (&Rgb, &Rgb)| f64::from(0.5 * (*a + *b).luminance());
+        let mean = a.iter().zip(b).map(luminance).sum::<f64>() / a.len() as f64;
+        let floor = (0.1 * mean).powi(2);
+        for (i, (error, pixel)) in errors.iter_mut().zip(picture).enumerate() {
+            let [from_a, from_b] = [a[i], b[i]].map(|r| (*pixel - r).to_array());
+            let products = from_a.iter().zip(from_b).map(|(x, y)| f64::from(*x) * f64::from(y));
+            *error += products.sum::<f64>() / 3.0 / (luminance((&a[i], &b[i])).powi(2) + floor);
+        }
+    }
+}
+
+pub(super) fn tables(rows: &[Row]) -> Vec<Table> {
+    let head = [
+        "case",
+        "strategy",
+        "spp",
+        "relMSE",
+        "rays/px",
+        "relMSE × rays",
+        "CPU-s × relMSE",
+        "worst pixel",
+    ];
+    let mut table = Table::new("Interiors", &head);
+    for row in rows {
+        let portals = if row.portals { " with portals" } else { "" };
+        table.rows.push(vec![
+            format!("{} / {} / {}", row.scene, row.probe, row.material),
+            format!("{}{portals}", row.strategy),
+            row.samples.to_string(),
+            number(row.rel_mse),
+            number(row.shadow_rays_per_pixel),
+            number(row.rel_mse * row.shadow_rays_per_pixel),
+            number(row.rel_mse * row.cpu_seconds),
+            format!("{:.0} %", 100.0 * row.largest_pixel),
+        ]);
+    }
+    let note = "relMSE: the squared error over R² + (0.1 × the mean luminance)², so that dark rooms count. Worst pixel: \
+                its part of the error, over all seeds.";
+    table.notes.push(note.to_owned());
+    vec![table]
+}
