@@ -12,7 +12,7 @@ use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Frame, Vec3, vec3};
 use domelight::sampling::{Heuristic, Sampler, SamplerKind};
 use domelight::strategy::levels::{N_LEVELS, level};
-use domelight::strategy::product::ProductScratch;
+use domelight::strategy::product::{ProductPass, ProductScratch};
 use domelight::strategy::{
     Contributions, LightTable, MultipleImportanceSampling, PixelPoints, Portal, ProductSampling,
     ShadingPoint, Strategy, TileShading,
@@ -29,20 +29,71 @@ const N_PASSES: usize = 2;
 /// Those that trace all their candidates, and those that choose by what the former taught.
 const KINDS: [&str; N_LEVELS as usize] = ["pilots", "first", "second", "third", "last"];
 
-/// The mean estimate of each kind of pixel under one seed.
-fn estimates(
-    strategy: &ProductSampling,
-    env: &Environment,
-    hits: &[ShadingPoint],
-    portals: &[Portal],
-    (sampler, seed): (SamplerKind, u64),
-) -> [[f64; 3]; KINDS.len()] {
-    let n = hits.len();
-    let mut scratch = ProductScratch::default();
-    let (mut sums, mut counts) = ([[0.0; 3]; KINDS.len()], [0.0; KINDS.len()]);
-    for pass in 0..N_PASSES {
-        let shared =
-            strategy.begin_pass(Sampler::for_pass(sampler, seed, (pass * n) as u32), n as u32);
+/// Who tells a pass what is visible before it begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Scouts {
+    None,
+    /// They see what the tile sees.
+    Honest,
+    /// They see what is hidden, and nothing else.
+    Liars,
+}
+
+/// What a tile is made of.
+#[derive(Clone, Copy)]
+struct TestTile<'a> {
+    strategy: &'a ProductSampling<'a>,
+    env: &'a Environment,
+    hits: &'a [ShadingPoint],
+    portals: &'a [Portal],
+    scouts: Scouts,
+    sampler: SamplerKind,
+}
+
+impl TestTile<'_> {
+    /// The mean estimate of each kind of pixel under one seed.
+    fn estimates(&self, seed: u64) -> [[f64; 3]; KINDS.len()] {
+        let Self { strategy, env, hits, .. } = *self;
+        let mut scratch = ProductScratch::default();
+        let (mut sums, mut counts) = ([[0.0; 3]; KINDS.len()], [0.0; KINDS.len()]);
+        for pass in 0..N_PASSES {
+            let first = (pass * hits.len()) as u32;
+            let mut shared = self.begin_pass(seed, first);
+            if self.scouts != Scouts::None {
+                // Scouts have their own random numbers.
+                let pool = self.begin_pass(!seed, first);
+                let is_liar = self.scouts == Scouts::Liars;
+                let visible = |wi| if hidden(env, wi) == is_liar { 1.0 } else { 0.0 };
+                self.render(&pool, (!seed, first), &mut scratch, visible, |_, _| {});
+                strategy.brief(&mut shared, vec![strategy.findings(&scratch)]);
+            }
+            let visible = |wi| if hidden(env, wi) { 0.0 } else { 1.0 };
+            self.render(&shared, (seed, first), &mut scratch, visible, |kind, sum| {
+                counts[kind] += hits.len() as f64;
+                sums[kind].iter_mut().zip(sum.to_array()).for_each(|(s, v)| *s += f64::from(v));
+            });
+        }
+        let in_tile = (0..SIDE * SIDE).map(|i| level(i % SIDE, i / SIDE) as usize);
+        let mut n_pixels = [0.0; KINDS.len()];
+        in_tile.for_each(|kind| n_pixels[kind] += 1.0);
+        std::array::from_fn(|kind| sums[kind].map(|s| s / (counts[kind] * n_pixels[kind])))
+    }
+
+    fn begin_pass(&self, seed: u64, first: u32) -> ProductPass {
+        let sampler = Sampler::for_pass(self.sampler, seed, first);
+        self.strategy.begin_pass(sampler, self.hits.len() as u32)
+    }
+
+    /// Renders a tile whose camera samples begin at `first`. Calls `of_kind` with the sum over the pixels of each kind.
+    fn render(
+        &self,
+        shared: &ProductPass,
+        (seed, first): (u64, u32),
+        scratch: &mut ProductScratch,
+        visible: impl Fn(Vec3) -> f32,
+        mut of_kind: impl FnMut(usize, Rgb),
+    ) {
+        let Self { strategy, hits, portals, sampler, .. } = *self;
         let mut out = Contributions::default();
         for round in 0..strategy.n_rounds() {
             let (mut points, mut samples) = (Vec::new(), Vec::new());
@@ -51,8 +102,7 @@ fn estimates(
                     let start = points.len();
                     if level(i % SIDE, i / SIDE) == round {
                         points.extend(hits);
-                        samples.extend((0..n).map(|j| (pass * n + j) as u32));
-                        counts[round as usize] += 1.0;
+                        samples.extend((0..hits.len() as u32).map(|j| first + j));
                     }
                     PixelPoints {
                         points: start..points.len(),
@@ -65,19 +115,14 @@ fn estimates(
             let tile =
                 TileShading { portals, ..TileShading::new(&points, &samples, &pixels, SIDE) };
             out.reset(points.len());
-            strategy.push(&shared, &tile, round, &mut scratch, &mut out);
-            let visible = |&wi| if hidden(env, wi) { 0.0 } else { 1.0 };
-            let visibility: Vec<f32> = out.wi.iter().map(visible).collect();
+            strategy.push(shared, &tile, round, scratch, &mut out);
+            let visibility: Vec<f32> = out.wi.iter().map(|&wi| visible(wi)).collect();
             let seen =
                 out.weight.iter().zip(&visibility).filter(|(_, v)| **v > 0.0).map(|(w, _)| w);
-            let sum: Rgb = out.base.iter().chain(seen).copied().sum();
-            for (s, v) in sums[round as usize].iter_mut().zip(sum.to_array()) {
-                *s += f64::from(v) / n as f64;
-            }
-            strategy.learn(&tile, &out, &visibility, &mut scratch);
+            of_kind(round as usize, out.base.iter().chain(seen).copied().sum());
+            strategy.learn(&tile, &out, &visibility, scratch);
         }
     }
-    std::array::from_fn(|kind| sums[kind].map(|s| s / counts[kind]))
 }
 
 /// Checks the mean over many seeds of every kind of pixel.
@@ -89,23 +134,23 @@ fn check(
     hits: &[ShadingPoint],
     expected: [f64; 3],
 ) {
-    check_with_portals(test, label, strategy, env, hits, &[], expected);
+    check_hints(test, label, strategy, env, hits, (&[], Scouts::None), expected);
 }
 
-/// [`check`] with portals.
-fn check_with_portals(
+/// [`check`] with portals and scouts.
+fn check_hints(
     test: ZTest,
     label: &str,
     strategy: &ProductSampling,
     env: &Environment,
     hits: &[ShadingPoint],
-    portals: &[Portal],
+    (portals, scouts): (&[Portal], Scouts),
     expected: [f64; 3],
 ) {
     let sampler =
         if hits.len().is_multiple_of(2) { SamplerKind::Sobol } else { SamplerKind::Independent };
-    let batches: Vec<_> =
-        (0..48).map(|seed| estimates(strategy, env, hits, portals, (sampler, seed))).collect();
+    let tile = TestTile { strategy, env, hits, portals, scouts, sampler };
+    let batches: Vec<_> = (0..48).map(|seed| tile.estimates(seed)).collect();
     for (kind, name) in KINDS.iter().enumerate() {
         let batches: Vec<[f64; 3]> = batches.iter().map(|b| b[kind]).collect();
         let label = format!("{label}, {name}");
@@ -141,7 +186,34 @@ fn portals_are_unbiased_wherever_they_stand() {
             let strategy = ProductSampling::new(&env, n_rays);
             let label = format!("{name}, portals {k}, {n_rays} rays, {n_hits} hits");
             let hits = vec![at; n_hits];
-            check_with_portals(test, &label, &strategy, &env, &hits, portals, expected);
+            let hints = (*portals, Scouts::None);
+            check_hints(test, &label, &strategy, &env, &hits, hints, expected);
+        }
+    });
+}
+
+/// Scouts are hints: what they say changes noise, never the mean, though all of it be wrong.
+#[test]
+fn scouts_are_unbiased_whatever_they_say() {
+    let env = environment(true, UpAxis::Z);
+    let cases = [(0.2, 8, 3), (1.3, 2, 12), (0.7, 1, 2)];
+    let scouts = [Scouts::Honest, Scouts::Liars];
+    let portals = portals();
+    let suite = Suite::of(MATERIALS.len() * 2 * scouts.len() * KINDS.len());
+    let test = ZTest { suite, ..ZTest::default() };
+    MATERIALS.par_iter().enumerate().for_each(|(i, name)| {
+        for (k, scouts) in scouts.into_iter().enumerate() {
+            for portals in [&[], &portals[..]] {
+                let (theta, n_rays, n_hits) = cases[(i + k) % cases.len()];
+                let at = point(bsdf(name), theta);
+                let expected = quadrature(&env, &at);
+                let strategy = ProductSampling::new(&env, n_rays);
+                let n = portals.len();
+                let label =
+                    format!("{name}, {scouts:?}, {n} portals, {n_rays} rays, {n_hits} hits");
+                let (hits, hints) = (vec![at; n_hits], (portals, scouts));
+                check_hints(test, &label, &strategy, &env, &hits, hints, expected);
+            }
         }
     });
 }
@@ -157,12 +229,16 @@ fn every_instruction_set_gives_the_same_bits() {
         // In a short pass and in a long one.
         let [short, long] = [(hits.to_vec(), 7), (hits.repeat(3), 2)];
         let portals = portals();
-        for ((hits, n_rays), portals) in
-            [(short.clone(), &[][..]), (long, &[]), (short, &portals[..])]
-        {
+        for ((hits, n_rays), portals, scouts) in [
+            (short.clone(), &[][..], Scouts::None),
+            (long, &[], Scouts::Honest),
+            (short, &portals[..], Scouts::Liars),
+        ] {
             let of = |set| {
-                let strategy = ProductSampling::new(&env, n_rays).with_instruction_set(set)?;
-                Some(estimates(&strategy, &env, &hits, portals, (*sampler, 5)))
+                let strategy = &ProductSampling::new(&env, n_rays).with_instruction_set(set)?;
+                let (env, hits, sampler) = (&env, &hits[..], *sampler);
+                let tile = TestTile { strategy, env, hits, portals, scouts, sampler };
+                Some(tile.estimates(5))
             };
             let scalar = of(InstructionSet::Scalar);
             for set in InstructionSet::ALL {
@@ -228,9 +304,15 @@ fn mirror_like_lobes_agree_with_multiple_importance_sampling() {
         MultipleImportanceSampling::new(&env, LightTable::Full, Heuristic::Balance, 1, 1).unwrap();
     let expected = batches(&mis, &env, &at, SamplerKind::Sobol, 1024);
     let strategy = ProductSampling::new(&env, 8);
-    let found: Vec<_> = (0..48)
-        .map(|seed| estimates(&strategy, &env, &[at; 4], &[], (SamplerKind::Sobol, seed)))
-        .collect();
+    let tile = TestTile {
+        strategy: &strategy,
+        env: &env,
+        hits: &[at; 4],
+        portals: &[],
+        scouts: Scouts::None,
+        sampler: SamplerKind::Sobol,
+    };
+    let found: Vec<_> = (0..48).map(|seed| tile.estimates(seed)).collect();
     for (kind, name) in KINDS.iter().enumerate() {
         let found: Vec<[f64; 3]> = found.iter().map(|b| b[kind]).collect();
         ZTest::in_suite_of(KINDS.len()).two_sample(name, &found, &expected).unwrap();

@@ -57,6 +57,7 @@ pub struct Renderer<'a, S: Strategy = PreparedStrategy<'a>> {
     mark: Mark,
     /// The pass that the observer ended, to be continued.
     interrupted: Option<(u32, Pass<S>)>,
+    scout_rays: u64,
 }
 
 /// A strategy owned by the renderer, or the caller's.
@@ -164,6 +165,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
             before: Counts::default(),
             mark: Mark::default(),
             interrupted: None,
+            scout_rays: 0,
         };
         empty.only(0..tiling.n_tiles())
     }
@@ -252,7 +254,11 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self.mark = self.mark.next();
         let pass = match self.interrupted.take() {
             Some((of, pass)) if of == start && pass.n_samples <= most => pass,
-            _ => self.begin_pass(start, most),
+            _ => {
+                let (pass, scout_rays) = self.begin_pass(start, most);
+                self.scout_rays += scout_rays;
+                pass
+            }
         };
         // Scouts that were cut short have seen nothing, so the pass is begun anew.
         if observer.has_cut_short() {
@@ -288,8 +294,9 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         PassEnd::Canceled
     }
 
-    /// Prepares the pass that begins at sample `start`, with at most `most` samples.
-    fn begin_pass(&self, start: u32, most: u32) -> Pass<S> {
+    /// Prepares the pass that begins at sample `start`, with at most `most` samples. Returns the number of scouts' shadow
+    /// rays, too.
+    fn begin_pass(&self, start: u32, most: u32) -> (Pass<S>, u64) {
         let Self { context, strategy, tiling, .. } = self;
         let (strategy, settings): (&S, _) = (strategy, &context.settings);
         let left = settings.n_samples - start;
@@ -306,14 +313,17 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let adaptive = settings.adapts(strategy);
         let (mean_log, brightness, is_scouting) = (None, None, false);
         let mut pass = Pass { n_samples, set, adaptive, mean_log, brightness, is_scouting, shared };
-        if strategy.n_rounds() > 1
-            && let Some((scouted, findings)) = scout(context, strategy, &pass)
-        {
-            pass.mean_log = adaptive.then_some(scouted.mean_log);
-            pass.brightness = scouted.brightness;
-            strategy.brief(&mut pass.shared, findings);
+        let mut scout_rays = 0;
+        if strategy.n_rounds() > 1 {
+            let (scouting, rays) = scout(context, strategy, &pass);
+            if let Some((scouted, findings)) = scouting {
+                pass.mean_log = adaptive.then_some(scouted.mean_log);
+                pass.brightness = scouted.brightness;
+                strategy.brief(&mut pass.shared, findings);
+            }
+            scout_rays = rays;
         }
-        pass
+        (pass, scout_rays)
     }
 
     /// Whether all samples of all pixels were taken.
@@ -364,6 +374,12 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     /// Counts of the work done, including the work before the renderer was restored.
     pub fn counts(&self) -> Counts {
         self.tiles.iter().fold(self.before, |sum, tile| sum + tile.counts)
+    }
+
+    /// The shadow rays of scouts, which this renderer sent ahead of passes of a strategy that learns. They are no part of
+    /// [`Self::counts`], because each part of a picture sends them.
+    pub fn scout_rays(&self) -> u64 {
+        self.scout_rays
     }
 
     /// The sums of all pixels so far.

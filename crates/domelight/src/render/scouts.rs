@@ -124,8 +124,11 @@ fn mean_log(scouts: &[Scout], n: u32) -> Option<f32> {
     Some(high)
 }
 
-/// Sends scouts over the picture, and returns the scale and what the strategy has learned in each window; `None` if no
-/// scout sees the scene.
+/// What scouts tell about a picture, and what the strategy has learned in each window.
+type Scouting<S> = (Scouted, Vec<<S as Strategy>::Findings>);
+
+/// Sends scouts over the picture, and returns what they tell, `None` if none of them sees the scene, and the number of
+/// shadow rays that they took.
 ///
 /// Scouts are windows of pixels, spread over the picture, with their own random numbers, because a scale that depends
 /// on a pixel's own samples would introduce bias. They are rendered twice: a few with the same number of samples in
@@ -135,7 +138,7 @@ pub(super) fn scout<S: Strategy>(
     context: &RenderContext,
     strategy: &S,
     pass: &Pass<S>,
-) -> Option<(Scouted, Vec<S::Findings>)> {
+) -> (Option<Scouting<S>>, u64) {
     /// The number of pixels of the picture per window. Scouts cost a fiftieth of the render, less for large pictures.
     const PIXELS_PER_WINDOW: usize = 20 * SCOUT_WINDOW * SCOUT_WINDOW;
     /// The minimum and maximum number of windows.
@@ -164,26 +167,35 @@ pub(super) fn scout<S: Strategy>(
     };
     // Second sets of samples count toward the budget, except with a target error, where they are passes of their own.
     let second_sets = if settings.target_error.is_none() { SECOND_SETS } else { 0.0 };
-    let scouts = |n: usize, pass: &Pass<S>| -> (Vec<Scout>, Vec<S::Findings>) {
-        let windows: Vec<(Vec<Scout>, S::Findings)> = spread(width, height, SCOUT_WINDOW, n)
+    let mut n_rays = 0;
+    let mut send = |n: usize, pass: &Pass<S>| -> (Vec<Scout>, Vec<S::Findings>) {
+        let windows: Vec<_> = spread(width, height, SCOUT_WINDOW, n)
             .into_par_iter()
             .map_init(Box::<Scratch<S>>::default, |scratch, window| {
-                Tile::new(window).render(context, strategy, pass, scratch, &());
-                let scouts = Scout::of_window(scratch, second_sets).collect();
-                (scouts, strategy.findings(scratch.of_strategy()))
+                let counts = Tile::new(window).render(context, strategy, pass, scratch, &());
+                let scouts: Vec<_> = Scout::of_window(scratch, second_sets).collect();
+                // A strategy is not asked about a window where nothing is visible.
+                let seeing = scratch.seen().contains(&true);
+                let findings = seeing.then(|| strategy.findings(scratch.of_strategy()));
+                (scouts, findings, counts.shadow_rays)
             })
             .collect();
-        let (scouts, findings): (Vec<_>, _) = windows.into_iter().unzip();
-        (scouts.concat(), findings)
+        let (mut scouts, mut findings) = (Vec::new(), Vec::new());
+        for (of_window, found, rays) in windows {
+            scouts.extend(of_window);
+            findings.extend(found);
+            n_rays += rays;
+        }
+        (scouts, findings)
     };
-    let (first_scouts, first_findings) = scouts(FIRST, &pass);
-    let first = Scouted::by(&first_scouts, pass.n_samples)?;
+    let (scouts, findings) = send(FIRST, &pass);
+    let Some(first) = Scouted::by(&scouts, pass.n_samples) else { return (None, n_rays) };
     (pass.mean_log, pass.brightness) = (Some(first.mean_log), first.brightness);
-    strategy.brief(&mut pass.shared, first_findings);
+    strategy.brief(&mut pass.shared, findings);
     let [fewest, most] = N_WINDOWS;
     let n_windows = (width * height / PIXELS_PER_WINDOW).clamp(fewest, most);
-    let (scouts, findings) = scouts(n_windows, &pass);
-    Some((Scouted::by(&scouts, pass.n_samples)?, findings))
+    let (scouts, findings) = send(n_windows, &pass);
+    (Scouted::by(&scouts, pass.n_samples).map(|scouted| (scouted, findings)), n_rays)
 }
 
 /// About `n` windows of `size` × `size` pixels, or as large as the picture allows, one at a random position in each

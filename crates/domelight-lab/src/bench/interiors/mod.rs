@@ -5,7 +5,7 @@ mod scenes;
 use domelight::Rgb;
 use domelight::bsdf::Bsdf;
 use domelight::environment::Environment;
-use domelight::render::{self, Background, Filter, RenderSettings};
+use domelight::render::{Background, Filter, RenderSettings, Renderer, Rendering};
 use domelight::scene::{Camera, Scene, SceneDescription};
 use domelight::strategy::{PreparedStrategy, StrategySpec};
 use serde::{Deserialize, Serialize};
@@ -114,26 +114,30 @@ impl<'a> InteriorCase<'a> {
         for half in 0..2 {
             bench.host.check_canceled()?;
             let seed = REFERENCE_SEED + half as u64;
-            let reference = case.render(best, REFERENCE, REFERENCE_SAMPLES, seed)?;
-            case.halves[half] = reference.layers.color.pixels;
+            (case.halves[half], _) = case.render(best, REFERENCE, REFERENCE_SAMPLES, seed)?;
         }
         Ok(case)
     }
 
+    /// The picture and the number of its shadow rays, with those of scouts.
     fn render(
         &self,
         scene: usize,
         strategy: &str,
         n_samples: u32,
         seed: u64,
-    ) -> Result<render::Rendering, Error> {
+    ) -> Result<(Vec<Rgb>, u64), Error> {
         let (scene, camera) = &self.scenes[scene];
         let settings = RenderSettings { n_samples, seed, ..self.settings };
         let spec: StrategySpec =
             strategy.parse().map_err(|e| Error::Usage(format!("{strategy}: {e}")))?;
         let spec = spec.for_picture(scene, camera, self.environment, &settings);
         let strategy = PreparedStrategy::new(spec, self.environment)?;
-        Ok(render::render(scene, camera, self.environment, &strategy, &settings, &()))
+        let mut renderer =
+            Renderer::with_strategy(scene, camera, self.environment, &strategy, settings);
+        renderer.run(&());
+        let Rendering { layers, counts, .. } = renderer.rendering();
+        Ok((layers.color.pixels, counts.shadow_rays + renderer.scout_rays()))
     }
 
     fn measure(&self, bench: &Bench) -> Result<Vec<Row>, Error> {
@@ -163,11 +167,12 @@ impl<'a> InteriorCase<'a> {
         for seed in 0..u64::from(n_seeds) {
             bench.host.check_canceled()?;
             let mut watch = Stopwatch::start();
-            let rendering = self.render(scene, strategy, samples, bench.settings.seed + seed)?;
+            let (picture, n_rays) =
+                self.render(scene, strategy, samples, bench.settings.seed + seed)?;
             let time = watch.lap();
             cpu_seconds += time.cpu.unwrap_or(time.wall) / f64::from(n_seeds);
-            rays += rendering.counts.shadow_rays as f64;
-            self.add_errors(&rendering.layers.color.pixels, &mut errors);
+            rays += n_rays as f64;
+            self.add_errors(&picture, &mut errors);
         }
         let n = errors.len() as f64;
         let sum: f64 = errors.iter().sum();

@@ -37,8 +37,7 @@ impl Findings {
         let mut counts = Box::new([ZERO_CELLS; 2]);
         for (sums, blocks) in counts.iter_mut().zip([&stats.rays, &stats.free]) {
             for block in blocks {
-                let pairs = sums.iter_mut().flatten().zip(block.iter().flatten());
-                pairs.for_each(|(sum, count)| *sum += count);
+                add(sums, block);
             }
         }
         Self { position: (n > 0).then(|| sum / n as f32), counts }
@@ -46,24 +45,34 @@ impl Findings {
 }
 
 /// What all scouts have found.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Scouted {
     positions: Vec<Vec3>,
     /// The numbers of rays to each cell, and of the unoccluded ones.
     counts: Vec<Box<[CellArray; 2]>>,
     /// (0.3 r)².
     squared_radius: f32,
+    /// The visibility of each cell from all windows together.
+    everywhere: CellArray,
+}
+
+impl Default for Scouted {
+    fn default() -> Self {
+        Self::new(Vec::new())
+    }
 }
 
 impl Scouted {
     pub(super) fn new(findings: Vec<Findings>) -> Self {
         let seeing = findings.into_iter().filter_map(|f| Some((f.position?, f.counts)));
-        let (positions, counts): (Vec<_>, _) = seeing.unzip();
+        let (positions, counts): (Vec<_>, Vec<_>) = seeing.unzip();
         let n = positions.len().max(1) as f32;
         let center = positions.iter().sum::<Vec3>() / n;
         let squares = positions.iter().map(|p| (p - center).length_squared());
         let squared_radius = RADIUS * RADIUS * squares.sum::<f32>() / n;
-        Self { positions, counts, squared_radius: squared_radius.max(f32::MIN_POSITIVE) }
+        let squared_radius = squared_radius.max(f32::MIN_POSITIVE);
+        let everywhere = everywhere(&counts);
+        Self { positions, counts, squared_radius, everywhere }
     }
 
     /// The nearest windows, each with its squared distance.
@@ -88,6 +97,8 @@ impl Scouted {
 pub(super) struct Briefing {
     /// The numbers of rays to each cell, and of the unoccluded ones.
     pub(super) counts: [CellArray; 2],
+    /// The visibility of each cell from all windows; `None` if nothing is known.
+    pub(super) everywhere: Option<Box<CellArray>>,
     /// The root mean square of what a candidate adds, over its light; 1 if nothing is known.
     pub(super) rms: CellArray,
 }
@@ -96,7 +107,7 @@ impl Default for Briefing {
     fn default() -> Self {
         let mut rms = ZERO_CELLS;
         rms.fill([1.0; LANES]);
-        Self { counts: [ZERO_CELLS; 2], rms }
+        Self { counts: [ZERO_CELLS; 2], everywhere: None, rms }
     }
 }
 
@@ -130,7 +141,8 @@ impl Kernel for Prepare<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { briefing: Briefing { counts, rms }, cells, scouted, position } = self;
+        let Self { briefing: Briefing { counts, everywhere, rms }, cells, scouted, position } =
+            self;
         // Add the counts of the nearest windows.
         *counts = [ZERO_CELLS; 2];
         for (distance, of_window) in scouted.nearest(position) {
@@ -144,7 +156,6 @@ impl Kernel for Prepare<'_> {
             }
         }
         // Limit them, because the tile may see what scouts do not.
-        let mut all = [simd.splat(0.0); 2];
         let mut limited = [[[0.0; LANES]; 2]; TABLE_ROWS];
         let most = simd.splat(MOST_RAYS);
         for row in cells.rows() {
@@ -152,14 +163,14 @@ impl Kernel for Prepare<'_> {
             let factor = most / n.max(most);
             for (i, count) in counts.iter_mut().enumerate() {
                 let sum = simd.load(&count[row]) * factor;
-                all[i] = all[i] + sum;
                 (count[row], limited[row][i]) = (sum.store(), sum.store());
             }
         }
         // Estimate the root mean square.
-        let [n, k] = all.map(SimdF32x8::sum);
         let (mut with, mut without) = (simd.splat(0.0), simd.splat(0.0));
-        let of_all = (k + 1.0) / (n + 2.0);
+        let of_all = &scouted.everywhere;
+        **everywhere.get_or_insert_with(|| Box::new(ZERO_CELLS)) = *of_all;
+        let of_all = |row| simd.load(&of_all[row]);
         for_each_prior(simd, &limited[cells.rows()], of_all, |row, prior| {
             let p = simd.load(&prior.visible);
             let light = simd.splat(LEFT_OF_GLOSSY) * p.squared();
@@ -172,5 +183,31 @@ impl Kernel for Prepare<'_> {
         for row in cells.rows() {
             rms[row] = (simd.load(&rms[row]) + blind).store();
         }
+    }
+}
+
+/// The visibility of each cell from all windows together.
+fn everywhere(counts: &[Box<[CellArray; 2]>]) -> CellArray {
+    let mut sums = [ZERO_CELLS; 2];
+    for counts in counts {
+        for (sums, counts) in sums.iter_mut().zip(&**counts) {
+            add(sums, counts);
+        }
+    }
+    let total = |sums: &CellArray| sums.iter().flatten().sum::<f32>();
+    let of_all = (total(&sums[1]) + 1.0) / (total(&sums[0]) + 2.0);
+    let [n, k] = sums;
+    let mut visible = ZERO_CELLS;
+    for (v, (n, k)) in visible.iter_mut().flatten().zip(n.iter().flatten().zip(k.iter().flatten()))
+    {
+        *v = (k + of_all) / (n + 1.0);
+    }
+    visible
+}
+
+/// Adds the numbers of all cells.
+fn add(sums: &mut CellArray, counts: &CellArray) {
+    for (sum, count) in sums.iter_mut().flatten().zip(counts.iter().flatten()) {
+        *sum += count;
     }
 }

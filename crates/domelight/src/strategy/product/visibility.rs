@@ -144,9 +144,13 @@ impl VisibilityEstimate {
             (n, k) = (n + n_row, k + k_row);
             (*n_cells, *k_cells) = (n_row.store(), k_row.store());
         }
-        let all = (k.sum() + 1.0) / (n.sum() + 2.0);
+        let all = simd.splat((k.sum() + 1.0) / (n.sum() + 2.0));
         let mut priors = [Prior::PORTAL; MAX_ROWS];
-        for_each_prior(simd, &tile[..n_rows], all, |row, prior| priors[row] = prior);
+        let everywhere = |row| match &briefing.everywhere {
+            Some(visible) => simd.load(&visible[row]),
+            None => all,
+        };
+        for_each_prior(simd, &tile[..n_rows], everywhere, |row, prior| priors[row] = prior);
         let mut of_portals = Prior::PORTAL;
         if let Some(row) = portals {
             let [n, k] = [sum(simd, rays, row), sum(simd, free, row)];
@@ -202,20 +206,21 @@ impl Prior {
 pub(super) fn for_each_prior<S: Simd>(
     simd: S,
     counts: &[[Lanes; 2]],
-    all: f32,
+    everywhere: impl Fn(usize) -> S::F32x8,
     mut of_row: impl FnMut(usize, Prior),
 ) {
-    let (zero, one, all) = (simd.splat(0.0), simd.splat(1.0), simd.splat(all));
+    let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
     for (group, rows) in counts.chunks(GROUP).enumerate() {
         let (mut n_group, mut k_group) = (zero, zero);
         for [n, k] in rows {
             (n_group, k_group) = (n_group + simd.load(n), k_group + simd.load(k));
         }
         for (i, [n, k]) in rows.iter().enumerate() {
-            let (n, k) = (simd.load(n), simd.load(k));
+            let (n, k, all) = (simd.load(n), simd.load(k), everywhere(group * GROUP + i));
             let others = ((k_group - k).max(zero) + all) / ((n_group - n).max(zero) + one);
             let p = ((k + others) / (n + one)).min(one);
-            let doubt = (others.max(p) * simd.splat(1.0 / DARK)).max(simd.splat(LEAST_DOUBT));
+            let doubt =
+                (others.max(p).max(all) * simd.splat(1.0 / DARK)).max(simd.splat(LEAST_DOUBT));
             let doubt = doubt.min(one).store();
             of_row(group * GROUP + i, Prior { visible: p.store(), doubt });
         }
