@@ -94,7 +94,7 @@ impl TileEstimator<'_, '_> {
     /// Fills the table and, except for pilots, the control variate.
     ///
     /// Strata follow the light times the uncertainty of visibility, but the balance heuristic weights them by the product
-    /// alone, because BRDF samples do not come from the pool from which visibility was learned.
+    /// and what scouts have seen, because BRDF samples do not come from the pool from which the tile has learned.
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn tabulate_product<S: Simd>(

@@ -10,7 +10,7 @@
 //!    heuristic.
 //! 3. The tile's pixels are processed in [levels](super::levels). Pixels of the first level, the *pilots*, trace all
 //!    their candidates. From the rays of each level, the tile learns the `visibility` V̂ of each cell and the
-//!    brightness of its pixels.
+//!    brightness of its pixels. Scouts have begun to learn it before.
 //! 4. In the next levels, the integral of a `control_variate` h over all cells, seen through V̂, approximates the
 //!    reflected light. `systematic` sampling traces the candidates whose visibility matters:
 //!
@@ -21,11 +21,11 @@
 //!    The density of strata is proportional to light, reflectance and the uncertainty of visibility.
 //!
 //! The expectation is ∫ f L V dω for every V̂, brightness and pool, provided that they do not depend on the random
-//! numbers of strata, BRDF samples, portals and selection. V̂ and brightness come from pixels of lower levels, and each pixel
-//! and pass has its own sampler. V̂ and the candidates share the pool, which does no harm: given the pool, strata
-//! draw only from it, and the expectation of their part is a sum over the pool for any V̂ and any density derived
-//! from it. BRDF samples and points on portals do not come from the pool, so the weights that divide the light between them
-//! and strata depend only on the pixel's hits.
+//! numbers of strata, BRDF samples, portals and selection. V̂ and brightness come from pixels of lower levels and from
+//! scouts (`briefing`), and each pixel, pass and scout has its own sampler. V̂ and the candidates share the pool, which
+//! does no harm: given the pool, strata draw only from it, and the expectation of their part is a sum over the pool for
+//! any V̂ and any density derived from it. BRDF samples and points on portals do not come from the pool, so the weights that divide the light between them
+//! and strata depend only on the pixel's hits and on scouts, which have a pool of their own.
 //!
 //! Related: Clarberg & Akenine-Möller 2008, "Practical Product Importance Sampling for Direct
 //! Illumination", multiplies trees of BRDF and map; Atanasov et al. 2018, "Adaptive Environment

@@ -11,7 +11,8 @@
 //! tails of narrow lobes may vanish in single-precision sums; BRDF samples cover them.
 //!
 //! Where visibility is known, the density of strata follows its uncertainty too ([`Table::weight_by_visibility`]), and
-//! the table without visibility remains as the density in the balance heuristic ([`Table::keep_product`]).
+//! the table with the visibility that scouts have seen remains as the density in the balance heuristic
+//! ([`Table::keep_product`]).
 //!
 //! The running sum of the table is a distribution along the curve. Its M strata share one random
 //! offset: stratum k is at u = (k + ξ)/M.

@@ -9,7 +9,7 @@
 //! g² = V̂(1 − V̂) + (p(1 − p)/2 + 0.005 s)/(n + 1) + 0.0003 s        s = max(p, q)/0.1 within [0.003, 1]
 //! ```
 //!
-//! p is the visibility of the cell over the whole tile, with K of N rays unoccluded, those of [scouts](super::briefing)
+//! p is the visibility of the cell over the whole tile, with K of N rays unoccluded, those of scouts (`briefing`)
 //! among them; q that of the other cells in its group along the curve, and v₀ that of all cells. g is the
 //! standard deviation of a ray around V̂ combined with the uncertainty of V̂ itself, which is large if the tile's
 //! rays to the cell differ, and small where neither the cell nor its group was ever seen: behind the walls of a room.
