@@ -88,6 +88,7 @@ fn specs(environment: &Environment, points: &[ShadingPoint]) -> [StrategySpec; 5
         StrategySpec::Mis {
             n_environment: N_RAYS / 2,
             n_brdf: N_RAYS / 2,
+            n_portal: 0,
             heuristic: Heuristic::Power,
             compensation: true,
         },
@@ -183,6 +184,7 @@ fn reference(
     let spec = StrategySpec::Mis {
         n_environment: 8,
         n_brdf: 8,
+        n_portal: 0,
         heuristic: Heuristic::Power,
         compensation: false,
     };

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use domelight::Rgb;
-use domelight::inspect::{Decomposition, DirectionHistogram, Hemisphere, PixelSummary, advice};
+use domelight::inspect::{
+    Decomposition, DirectionHistogram, Enclosure, Hemisphere, PixelSummary, advice,
+};
 use domelight::strategy::PreparedStrategy;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -20,6 +22,7 @@ use crate::scene::{CameraLike, Scene};
 struct Found {
     summary: PixelSummary,
     hemisphere: Option<Hemisphere>,
+    enclosure: Option<Enclosure>,
     strategies: Vec<(Decomposition, Option<DirectionHistogram>)>,
 }
 
@@ -80,6 +83,7 @@ pub(crate) fn inspect<'py>(
         Ok(Found {
             summary: inspector.summary(),
             hemisphere: inspector.hemisphere(resolution),
+            enclosure: inspector.enclosure(),
             strategies: choices.iter().map(one).collect::<PyResult<_>>()?,
         })
     };
@@ -92,7 +96,7 @@ pub(crate) fn inspect<'py>(
 
 impl Found {
     fn into_dict(self, py: Python<'_>, resolution: usize) -> PyResult<Bound<'_, PyDict>> {
-        let Self { summary, hemisphere, strategies } = self;
+        let Self { summary, hemisphere, enclosure, strategies } = self;
         let square = [resolution, resolution];
         let picture =
             |pixels: &[Rgb]| rows(py, pixels.iter().map(|p| p.to_array()).collect(), &square);
@@ -145,7 +149,10 @@ impl Found {
             list.append(one)?;
         }
         found.set_item("strategies", list)?;
-        found.set_item("advice", advice(&decompositions).to_string())?;
+        let enclosure = enclosure.map(|enclosure| enclosure.to_string());
+        let sentences = [Some(advice(&decompositions).to_string()), enclosure];
+        let advice: Vec<String> = sentences.into_iter().flatten().collect();
+        found.set_item("advice", advice.join("; "))?;
         Ok(found)
     }
 }

@@ -99,10 +99,15 @@ impl Engine {
                 causes: d.shares.iter().map(|s| (s.cause.to_string(), s.share)).collect(),
                 samples,
             });
+            let enclosure = inspector.enclosure().map(|enclosure| enclosure.to_string());
             Ok(to_json(&Report {
                 summary: inspector.summary(),
                 strategies: strategies.collect(),
-                advice: advice(&found).to_string(),
+                advice: [Some(advice(&found).to_string()), enclosure]
+                    .into_iter()
+                    .flatten()
+                    .collect::<Vec<_>>()
+                    .join("; "),
             }))
         })
     }

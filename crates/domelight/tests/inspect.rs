@@ -7,6 +7,7 @@ use domelight::inspect::{Advice, Cause, Decomposition, Inspector, SourceKind, ad
 use domelight::math::{Vec3, vec3};
 use domelight::render::{Background, Filter, RenderSettings, render};
 use domelight::sampling::SamplerKind;
+use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
     Camera, CameraSettings, Material, Part, Projection, Scene, SceneDescription,
 };
@@ -352,4 +353,27 @@ fn a_pixel_outside_is_refused() {
         Inspector::new(&pixel.scene, &pixel.camera(), &pixel.environment, &settings, [1, 0]);
     let text = inspector.err().unwrap().to_string();
     assert!(text.contains("(1, 0)") && text.contains("1x1"), "{text}");
+}
+
+/// In the room, the window holds a small part of the sphere; the advice is a portal, unless there is one.
+#[test]
+fn a_room_is_told_apart() {
+    let environment =
+        Environment::new(RgbImage::filled(8, 4, Rgb::WHITE), Orientation::default(), 1.0);
+    let environment = environment.unwrap();
+    let settings = RenderSettings { width: 24, height: 24, ..RenderSettings::default() };
+    let enclosure = |scene: BuiltinScene, keep_portals: bool| {
+        let mut description = scene.description();
+        description.portals.retain(|_| keep_portals);
+        let scene = Scene::new(description).unwrap();
+        let camera = Camera::framing(&scene, 24, 24);
+        Inspector::new(&scene, &camera, &environment, &settings, [12, 20]).unwrap().enclosure()
+    };
+    let room = enclosure(BuiltinScene::Room, false).unwrap();
+    assert!((0.001..0.1).contains(&room.open), "{room:?}");
+    let text = room.to_string();
+    assert!(text.contains("of the sphere: name it as a portal"), "{text}");
+    let text = enclosure(BuiltinScene::Room, true).unwrap().to_string();
+    assert!(text.ends_with("of the sphere"), "{text}");
+    assert_eq!(enclosure(BuiltinScene::Spheres, false), None);
 }

@@ -4,14 +4,16 @@
 use crate::common;
 
 use common::{
-    HEIGHT, MATERIALS, WIDTH, batches, bsdf, environment, estimate, point, quadrature,
+    HEIGHT, MATERIALS, WIDTH, batches, bsdf, environment, estimate, hidden, point, quadrature,
     white_environment,
 };
 use domelight::bsdf::MaterialSpec;
 use domelight::environment::{CompensatedTable, Environment, Orientation, UpAxis};
+use domelight::math::{Vec3, vec3};
 use domelight::sampling::{Heuristic, Sampler, SamplerKind};
 use domelight::strategy::{
-    BrdfSampling, EnvironmentSampling, LightTable, MultipleImportanceSampling,
+    BrdfSampling, Contributions, EnvironmentSampling, InstructionSet, LightTable,
+    MultipleImportanceSampling, PixelPoints, PointStrategy, Portal, SampleScratch, TileShading,
 };
 use domelight::{Rgb, RgbImage};
 use rayon::prelude::*;
@@ -62,6 +64,61 @@ fn strategies_agree_with_quadrature() {
             }
         });
     }
+}
+
+/// Samples of portals are a third technique: the mean does not depend on where portals stand, nor on the instruction set.
+#[test]
+fn portals_beside_light_and_brdf_are_unbiased() {
+    const N: usize = 512;
+    let env = environment(true, UpAxis::Z);
+    let portal = |corner, a, b| Portal::new(corner, [a, b]).unwrap();
+    let portals = [
+        portal(vec3(-0.5, 1.0, -0.5), Vec3::X, Vec3::Z),
+        portal(vec3(0.5, 0.3, 0.5), vec3(0.2, 0.7, 0.0), vec3(1.0, 0.0, -2.0)),
+        portal(vec3(-1.0, -2.0, -1.0), 2.0 * Vec3::X, 2.0 * Vec3::Z),
+    ];
+    let counts = [(1, 1, 2), (0, 1, 1), (2, 0, 3), (0, 0, 1)];
+    let table = CompensatedTable::new(&env);
+    let suite = Suite::of(MATERIALS.len() * (counts.len() - 1));
+    let test = ZTest { suite, ..ZTest::default() };
+    MATERIALS.par_iter().enumerate().for_each(|(i, name)| {
+        let at = point(bsdf(name), [0.2, 1.1, 1.48][i % 3]);
+        let expected = quadrature(&env, &at);
+        for (k, (n_light, n_brdf, n_portal)) in counts.into_iter().enumerate() {
+            let (table, heuristic) = if (i + k) % 2 == 0 && n_brdf > 0 {
+                (LightTable::Compensated(table.clone()), Heuristic::Power)
+            } else {
+                (LightTable::Full, Heuristic::Balance)
+            };
+            let mis =
+                MultipleImportanceSampling::new(&env, table, heuristic, n_light, n_brdf).unwrap();
+            let mis = mis.with_portal_samples(n_portal);
+            let estimate = |seed, instruction_set| {
+                let sampler = Sampler::new(SamplerKind::Sobol, seed, 3);
+                let pixels = [PixelPoints::new(0..N, N as u32, sampler)];
+                let (points, samples) = (vec![at; N], (0..N as u32).collect::<Vec<_>>());
+                let tile = TileShading::new(&points, &samples, &pixels, 1);
+                let tile = TileShading { portals: &portals, instruction_set, ..tile };
+                let mut out = Contributions::default();
+                out.reset(N);
+                mis.sample_tile(&tile, &mut SampleScratch::default(), &mut out);
+                let rays = out.wi.iter().zip(&out.weight).filter(|(wi, _)| !hidden(&env, **wi));
+                let sum: Rgb = rays.map(|(_, &weight)| weight).sum();
+                sum.to_array().map(|c| f64::from(c) / N as f64)
+            };
+            let batches: Vec<_> =
+                (0..48).map(|seed| estimate(seed, InstructionSet::best())).collect();
+            assert_eq!(batches[0], estimate(0, InstructionSet::Scalar), "{name}");
+            let label = format!("{name}, {n_light}:{n_brdf}, {n_portal} of portals");
+            // Portals alone miss the light beside them.
+            if n_light + n_brdf > 0 {
+                test.against(&label, &batches, expected).unwrap_or_else(|f| panic!("{f}"));
+            } else {
+                let mean = |c: usize| batches.iter().map(|b| b[c]).sum::<f64>() / 48.0;
+                assert!((0..3).all(|c| mean(c) < expected[c]), "{label}");
+            }
+        }
+    });
 }
 
 /// Two techniques whose weights sum to one, divided by the common count as some slides have it,

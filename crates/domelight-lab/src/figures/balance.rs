@@ -133,6 +133,7 @@ fn measure(scene: &FigureScene, name: &'static str) -> Result<Curve, Error> {
             _ => StrategySpec::Mis {
                 n_environment,
                 n_brdf,
+                n_portal: 0,
                 heuristic: Heuristic::Power,
                 compensation: false,
             },

@@ -299,6 +299,7 @@ impl FigureScene<'_> {
         let spec = StrategySpec::Mis {
             n_environment: environment.div_ceil(n_samples),
             n_brdf: brdf.div_ceil(n_samples),
+            n_portal: 0,
             heuristic: Heuristic::Power,
             compensation: true,
         };

@@ -51,6 +51,7 @@ pub(super) fn mis(each: u32) -> StrategySpec {
     StrategySpec::Mis {
         n_environment: each,
         n_brdf: each,
+        n_portal: 0,
         heuristic: Heuristic::Power,
         compensation: true,
     }

@@ -3,7 +3,8 @@
 mod page;
 
 use domelight::inspect::{
-    Advice, Decomposition, DirectionHistogram, Hemisphere, Inspector, PixelSummary, Source, advice,
+    Advice, Decomposition, DirectionHistogram, Enclosure, Hemisphere, Inspector, PixelSummary,
+    Source, advice,
 };
 use domelight::quote::{Code, Html};
 use domelight::render::RenderSettings;
@@ -55,6 +56,8 @@ pub struct InspectionReport<'a> {
     pub advice: Advice,
     /// The same as a sentence.
     pub advice_text: String,
+    /// How much of the map the pixel's surface sees; null unless it is in a room.
+    pub enclosure: Option<Enclosure>,
     /// Maps of the hemisphere; null of a pixel that shows nothing of the scene.
     pub maps: Option<Maps>,
 }
@@ -145,7 +148,7 @@ impl<'a> Inspection<'a> {
         advice(&self.decompositions())
     }
 
-    /// A sentence for each strategy, and what would help.
+    /// A sentence for each strategy, what would help, and whether the pixel is in a room.
     pub fn summary(&self) -> Vec<String> {
         let all = self.decompositions();
         let width = all.iter().map(|d| d.name.chars().count()).max().unwrap_or(0);
@@ -155,6 +158,7 @@ impl<'a> Inspection<'a> {
         };
         let mut lines: Vec<String> = all.iter().map(line).collect();
         lines.push(self.advice().to_string());
+        lines.extend(self.inspector.enclosure().map(|enclosure| enclosure.to_string()));
         lines
     }
 
@@ -188,6 +192,7 @@ impl<'a> Inspection<'a> {
                 })
                 .collect(),
             advice_text: advice.to_string(),
+            enclosure: self.inspector.enclosure(),
             advice,
             maps: self.hemisphere.as_ref().map(maps),
         }

@@ -57,7 +57,7 @@ pub(super) fn page(inspection: &Inspection) -> Result<Code<Html>, Error> {
     ))
 }
 
-/// What would help, as a sentence of its own.
+/// What would help, and whether the pixel is in a room, as sentences.
 fn lead(report: &InspectionReport) -> String {
     let mut text = report.advice_text.clone();
     if let Some(first) = text.get(..1).map(str::to_uppercase) {
@@ -67,7 +67,10 @@ fn lead(report: &InspectionReport) -> String {
             text.replace_range(..1, &first);
         }
     }
-    text + "."
+    match &report.enclosure {
+        Some(enclosure) => format!("{text}. {enclosure}."),
+        None => text + ".",
+    }
 }
 
 fn causes(report: &InspectionReport) -> Code<Html> {

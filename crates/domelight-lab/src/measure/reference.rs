@@ -21,6 +21,7 @@ use crate::{At as _, Error, Host};
 pub(crate) const MIS: StrategySpec = StrategySpec::Mis {
     n_environment: 4,
     n_brdf: 4,
+    n_portal: 0,
     heuristic: Heuristic::Power,
     compensation: true,
 };

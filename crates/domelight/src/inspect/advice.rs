@@ -192,7 +192,7 @@ impl fmt::Display for Advice {
 }
 
 /// Two digits.
-fn percent(share: f64) -> String {
+pub(super) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     let digits = usize::from(percent.abs() < 10.0 && percent != 0.0);
     format!("{percent:.digits$} %")

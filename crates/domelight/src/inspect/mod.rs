@@ -29,12 +29,14 @@
 
 mod advice;
 mod decomposition;
+mod enclosure;
 mod hemisphere;
 mod regions;
 mod replicates;
 
 pub use advice::{Advice, advice};
 pub use decomposition::{Cause, Decomposition, Share, SourceStatistics};
+pub use enclosure::Enclosure;
 pub use hemisphere::{DirectionHistogram, DirectionSample, Hemisphere};
 pub use regions::{Source, SourceKind};
 
@@ -254,6 +256,13 @@ impl<'a> Inspector<'a> {
         let point = self.representative.as_ref()?;
         let trace = |point: &ShadingPoint, wi: &[Vec3]| self.trace(point, wi);
         Some(Hemisphere::new(point, self.environment, resolution, trace))
+    }
+
+    /// Whether the hit sees little of the map, as in a room; `None` for a pixel that does not.
+    pub fn enclosure(&self) -> Option<Enclosure> {
+        /// Pixels along an edge of the maps from which it is computed.
+        const RESOLUTION: usize = 32;
+        Enclosure::of(&self.hemisphere(RESOLUTION)?, !self.scene.portals().is_empty())
     }
 
     /// The distribution of a strategy's rays from that hit, as a map of `resolution` by `resolution` pixels; `None`

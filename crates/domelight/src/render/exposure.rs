@@ -109,6 +109,7 @@ fn pilot(
     let strategy = StrategySpec::Mis {
         n_environment: 4,
         n_brdf: 2,
+        n_portal: 0,
         heuristic: Heuristic::Power,
         compensation: false,
     };

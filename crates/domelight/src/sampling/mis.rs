@@ -26,6 +26,21 @@ impl Heuristic {
         self.weight_lanes(n_pdf, other)
     }
 
+    /// The `other` of [`Heuristic::weight`] that stands for two further techniques with these n pdf.
+    #[inline(always)]
+    pub(crate) fn together<F: SimdFloat>(self, [a, b]: [F; 2]) -> F {
+        match self {
+            Self::Balance => a + b,
+            Self::Power => {
+                // The ratio keeps the squares in range.
+                let zero = a.splat(0.0);
+                let (most, least) = (a.max(b), a.min(b));
+                let ratio = F::select(least.lt(most), least / most, a.splat(1.0));
+                F::select(zero.lt(most), most * (a.splat(1.0) + ratio * ratio).sqrt(), zero)
+            }
+        }
+    }
+
     /// [`Heuristic::weight`] of one sample or of several side by side.
     #[inline(always)]
     pub(crate) fn weight_lanes<F: SimdFloat>(self, n_pdf: F, other: F) -> F {

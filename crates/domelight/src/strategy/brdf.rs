@@ -20,6 +20,7 @@ impl BrdfSampling<'_> {
             light: self.environment.light_density(),
             n_light: Count::fixed(0),
             n_brdf: Count::fixed(self.n_samples),
+            n_portal: Count::fixed(0),
             heuristic: Heuristic::Balance,
         }
     }

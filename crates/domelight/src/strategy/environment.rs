@@ -22,6 +22,7 @@ impl EnvironmentSampling<'_> {
             light: self.environment.light_density(),
             n_light: Count::fixed(self.n_samples),
             n_brdf: Count::fixed(0),
+            n_portal: Count::fixed(0),
             heuristic: Heuristic::Balance,
         }
     }

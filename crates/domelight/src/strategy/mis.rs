@@ -14,7 +14,8 @@ pub enum LightTable {
     Compensated(CompensatedTable),
 }
 
-/// M environment samples and N BRDF samples at each point.
+/// M environment samples and N BRDF samples at each point, and, if asked for, Q points on the portals of the scene (see
+/// [`Portal`](super::Portal)), sampled in proportion to area.
 #[derive(Clone, Debug)]
 pub struct MultipleImportanceSampling<'a> {
     environment: &'a Environment,
@@ -22,6 +23,7 @@ pub struct MultipleImportanceSampling<'a> {
     heuristic: Heuristic,
     n_environment: u32,
     n_brdf: u32,
+    n_portal: u32,
 }
 
 /// A compensated table without BRDF samples would lose the dim light.
@@ -46,7 +48,13 @@ impl<'a> MultipleImportanceSampling<'a> {
         if matches!(table, LightTable::Compensated(_)) && n_brdf == 0 {
             return Err(CompensationNeedsBrdf);
         }
-        Ok(Self { environment, table, heuristic, n_environment, n_brdf })
+        Ok(Self { environment, table, heuristic, n_environment, n_brdf, n_portal: 0 })
+    }
+
+    /// The same strategy with samples of portals beside the others, in scenes that have any.
+    #[must_use]
+    pub fn with_portal_samples(self, n_portal: u32) -> Self {
+        Self { n_portal, ..self }
     }
 
     fn samples(&self) -> MultiSample<'_> {
@@ -59,6 +67,7 @@ impl<'a> MultipleImportanceSampling<'a> {
             light,
             n_light: Count::fixed(self.n_environment),
             n_brdf: Count::fixed(self.n_brdf),
+            n_portal: Count::fixed(self.n_portal),
             heuristic: self.heuristic,
         }
     }

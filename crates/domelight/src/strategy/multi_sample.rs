@@ -1,10 +1,11 @@
-//! Samples of light and BRDF at one point or at several side by side: Veach & Guibas 1995, equation 10 (the multi-sample
+//! Samples of light, BRDF and portals at one point or at several side by side: Veach & Guibas 1995, equation 10 (the multi-sample
 //! model; the weights sum to one for each direction).
 //!
 //! All strategies of independent samples draw them here: BRDF and environment sampling have samples of one technique, and
 //! the candidates of resampling are weighted by the balance heuristic.
 
 use super::point_lanes::{MOST_LANES, PointLanes, SampleLanes};
+use super::portal::Portals;
 use super::{Contributions, SampleIndex, ShadingPoint, TileShading};
 use crate::Rgb;
 use crate::environment::{Environment, LightDensity};
@@ -40,6 +41,8 @@ pub(super) struct MultiSample<'a> {
     pub(super) light: LightDensity<'a>,
     pub(super) n_light: Count,
     pub(super) n_brdf: Count,
+    /// Of points on portals, where a scene has any.
+    pub(super) n_portal: Count,
     pub(super) heuristic: Heuristic,
 }
 
@@ -57,7 +60,7 @@ macro_rules! point_strategy_of_samples {
 
             fn n_rays(&self) -> u32 {
                 let samples = self.samples();
-                samples.n_light.n + samples.n_brdf.n
+                samples.n_light.n + samples.n_brdf.n + samples.n_portal.n
             }
 
             fn sample(
@@ -88,6 +91,7 @@ pub(super) use point_strategy_of_samples;
 enum Technique {
     Light,
     Brdf,
+    Portal,
 }
 
 impl MultiSample<'_> {
@@ -98,10 +102,13 @@ impl MultiSample<'_> {
         sample_index: SampleIndex,
         mut push: impl FnMut(Vec3, Rgb),
     ) {
-        let (at, numbers) = (PointLanes::load(0.0, &[at]), [sample_index]);
-        for (technique, count) in self.techniques() {
+        let (points, numbers) = ([at], [sample_index]);
+        let at = PointLanes::load(0.0, &points);
+        let portals = Portals::new(&[]);
+        for (technique, count) in self.techniques(portals) {
             for j in 0..count.n {
-                let (wi, weight) = self.draw(technique, &at, SampleLanes::Points(&numbers), j);
+                let numbers = SampleLanes::Points(&numbers);
+                let (wi, weight) = self.draw(technique, portals, &at, numbers, j);
                 let weight = weight.single();
                 if !weight.is_black() {
                     push(wi.into(), weight);
@@ -117,6 +124,7 @@ impl MultiSample<'_> {
         scratch: &mut SampleScratch,
         out: &mut Contributions,
     ) {
+        let portals = Portals::new(tile.portals);
         let mut points = tile.each_point();
         // Take the next points, of any pixels.
         while let Some(first) = points.next() {
@@ -127,7 +135,7 @@ impl MultiSample<'_> {
             }
             let (at, samples) = (batch.map(|(_, at, _)| at), batch.map(|(_, _, sample)| sample));
             let numbers = SampleLanes::Points(&samples[..n]);
-            self.draw_all(tile.instruction_set, &at[..n], numbers, scratch);
+            self.draw_all(tile.instruction_set, portals, &at[..n], numbers, scratch);
             for (lane, &(point, ..)) in batch[..n].iter().enumerate() {
                 for row in &scratch.rows {
                     out.push(point, row.wi(lane), row.weight(lane));
@@ -148,10 +156,11 @@ impl MultiSample<'_> {
     ) {
         let lanes = self.n_light.n.max(self.n_brdf.n).clamp(1, MOST_LANES as u32) as usize;
         let points = &[at; MOST_LANES][..lanes];
-        self.draw_all(instruction_set, points, SampleLanes::Consecutive(sample_index), scratch);
+        let (numbers, portals) = (SampleLanes::Consecutive(sample_index), Portals::new(&[]));
+        self.draw_all(instruction_set, portals, points, numbers, scratch);
         let mut rows = scratch.rows.iter();
         let mut number = 0;
-        for (_, count) in self.techniques() {
+        for (_, count) in self.techniques(portals) {
             for first in (0..count.n).step_by(MOST_LANES) {
                 let row = rows.next().expect("a row for each step");
                 for lane in 0..MOST_LANES.min((count.n - first) as usize) {
@@ -162,18 +171,25 @@ impl MultiSample<'_> {
         }
     }
 
-    fn techniques(&self) -> [(Technique, Count); 2] {
-        [(Technique::Light, self.n_light), (Technique::Brdf, self.n_brdf)]
+    /// The ways to draw directions in a scene with these portals.
+    fn techniques(&self, portals: Portals) -> [(Technique, Count); 3] {
+        let n_portal = if portals.is_empty() { Count::fixed(0) } else { self.n_portal };
+        [
+            (Technique::Light, self.n_light),
+            (Technique::Brdf, self.n_brdf),
+            (Technique::Portal, n_portal),
+        ]
     }
 
     fn draw_all(
         &self,
         instruction_set: InstructionSet,
+        portals: Portals,
         points: &[&ShadingPoint],
         numbers: SampleLanes,
         scratch: &mut SampleScratch,
     ) {
-        dispatch(instruction_set, DrawAll { samples: self, points, numbers, scratch });
+        dispatch(instruction_set, DrawAll { samples: self, portals, points, numbers, scratch });
     }
 
     /// Draws sample `j` of a technique at each point: the direction of a shadow ray and its weight, black where there is
@@ -182,6 +198,7 @@ impl MultiSample<'_> {
     fn draw<F: SimdFloat>(
         &self,
         technique: Technique,
+        portals: Portals,
         at: &PointLanes<F>,
         numbers: SampleLanes,
         j: u32,
@@ -202,6 +219,10 @@ impl MultiSample<'_> {
                 let wi = at.to_world(local);
                 (wi, local, self.environment.le_lanes(wi))
             }
+            Technique::Portal => {
+                let wi = at.toward_portals(portals, numbers, j, self.n_portal.reserved);
+                (wi, at.to_local(wi), self.environment.le_lanes(wi))
+            }
         };
         // Weigh them by the densities of both techniques. Directions below the surface are dark without a ray.
         let (value, pdf_brdf) = at.eval(local);
@@ -210,9 +231,19 @@ impl MultiSample<'_> {
         // A technique without samples has no density, even where that is infinite.
         let of_light = F::select(zero.lt(n_light), of_light, zero);
         let of_brdf = F::select(zero.lt(n_brdf), of_brdf, zero);
-        let (own, other) = match technique {
-            Technique::Light => (of_light, of_brdf),
-            Technique::Brdf => (of_brdf, of_light),
+        let (own, other) = if self.n_portal.n == 0 || portals.is_empty() {
+            match technique {
+                Technique::Light => (of_light, of_brdf),
+                Technique::Brdf | Technique::Portal => (of_brdf, of_light),
+            }
+        } else {
+            let of_portal = zero.splat(self.n_portal.expected) * portals.pdf(at.positions(), wi);
+            let (own, others) = match technique {
+                Technique::Light => (of_light, [of_brdf, of_portal]),
+                Technique::Brdf => (of_brdf, [of_light, of_portal]),
+                Technique::Portal => (of_portal, [of_light, of_brdf]),
+            };
+            (own, self.heuristic.together(others))
         };
         let has_density = zero.lt(own) & own.le(zero.splat(f32::MAX));
         let is_drawn = has_density & zero.lt(at.ng.dot_each(wi));
@@ -248,6 +279,7 @@ impl Row {
 /// Draws all samples of the points, a row for each sample, or the samples of one point, a row for as many as there are lanes.
 struct DrawAll<'a> {
     samples: &'a MultiSample<'a>,
+    portals: Portals<'a>,
     points: &'a [&'a ShadingPoint],
     numbers: SampleLanes<'a>,
     scratch: &'a mut SampleScratch,
@@ -258,17 +290,17 @@ impl Kernel for DrawAll<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { samples, points, numbers, scratch: SampleScratch { rows } } = self;
+        let Self { samples, portals, points, numbers, scratch: SampleScratch { rows } } = self;
         let at = PointLanes::load(simd.splat_f32x16(0.0), points);
         let step = match numbers {
             SampleLanes::Points(_) => 1,
             SampleLanes::Consecutive(_) => MOST_LANES,
         };
         rows.clear();
-        for (technique, count) in samples.techniques() {
+        for (technique, count) in samples.techniques(portals) {
             for j in (0..count.n).step_by(step) {
                 let (Vectors { x, y, z }, Colors([r, g, b])) =
-                    samples.draw(technique, &at, numbers, j);
+                    samples.draw(technique, portals, &at, numbers, j);
                 rows.push(Row {
                     wi: [x.store(), y.store(), z.store()],
                     weight: [r.store(), g.store(), b.store()],

@@ -1,5 +1,6 @@
 //! Shading points side by side, so that a strategy is written once for one point and for sixteen.
 
+use super::portal::Portals;
 use super::{SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::bsdf::{Brdf as _, Bsdf, LobeChoice};
@@ -12,6 +13,7 @@ pub(super) const MOST_LANES: usize = 16;
 
 /// Shading points, one per lane.
 pub(super) struct PointLanes<'a, F: SimdFloat> {
+    points: &'a [&'a ShadingPoint],
     /// Directions toward the viewer, in the shading frames.
     pub(super) wo: Vectors<F>,
     /// The axes of the shading frames.
@@ -34,7 +36,7 @@ enum Bsdfs<'a, F: SimdFloat> {
 impl<'a, F: SimdFloat> PointLanes<'a, F> {
     /// The points, at most as many as lanes; the last one stands in for missing ones.
     #[inline(always)]
-    pub(super) fn load(like: F, points: &[&'a ShadingPoint]) -> Self {
+    pub(super) fn load(like: F, points: &'a [&'a ShadingPoint]) -> Self {
         let last = points.len() - 1;
         let bsdf = |lane: usize| &points[lane.min(last)].bsdf;
         let [ox, oy, oz, gx, gy, gz] = like.by_lane(|lane| {
@@ -52,12 +54,43 @@ impl<'a, F: SimdFloat> PointLanes<'a, F> {
             Bsdfs::Different(std::array::from_fn(bsdf), points.len())
         };
         Self {
+            points,
             wo: Vectors { x: ox, y: oy, z: oz },
             frame: [axis(|frame| frame.x), axis(|frame| frame.y), axis(|frame| frame.z)],
             ng: Vectors { x: gx, y: gy, z: gz },
             bsdfs,
             has_choice: points.iter().any(|at| at.bsdf.has_choice()),
         }
+    }
+
+    /// The world positions.
+    #[inline(always)]
+    pub(super) fn positions(&self) -> Vectors<F> {
+        let last = self.points.len() - 1;
+        let [x, y, z] = self.wo.x.by_lane(|lane| self.points[lane.min(last)].position.to_array());
+        Vectors { x, y, z }
+    }
+
+    /// World directions toward points on portals, with number `j` of `n` of each camera sample.
+    #[inline(always)]
+    pub(super) fn toward_portals(
+        &self,
+        portals: Portals,
+        numbers: SampleLanes,
+        j: u32,
+        n: u32,
+    ) -> Vectors<F> {
+        let last = self.points.len() - 1;
+        let [x, y, z] = self.wo.x.by_lane(|lane| {
+            let (sequence, index) = numbers.sequence(lane, Dimension::Portal, j, n);
+            let numbers = sequence.numbers(index);
+            let toward =
+                portals.sample(numbers.u_lobe(), numbers.u()).map_or(Vec3::ZERO, |(_, point)| {
+                    (point - self.points[lane.min(last)].position).normalize_or_zero()
+                });
+            toward.to_array()
+        });
+        Vectors { x, y, z }
     }
 
     /// World directions in the shading frames.

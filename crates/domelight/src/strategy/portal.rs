@@ -92,6 +92,10 @@ impl<'a> Portals<'a> {
         Self { all, area: all.iter().map(Portal::area).sum() }
     }
 
+    pub(super) fn is_empty(self) -> bool {
+        self.all.is_empty()
+    }
+
     /// The sum of the areas.
     pub(super) fn area(self) -> f32 {
         self.area

@@ -114,19 +114,20 @@ impl<'e> PreparedStrategy<'e> {
             StrategySpec::Environment { n_samples } => {
                 Self::Environment(EnvironmentSampling { environment, n_samples })
             }
-            StrategySpec::Mis { n_environment, n_brdf, heuristic, compensation } => {
+            StrategySpec::Mis { n_environment, n_brdf, n_portal, heuristic, compensation } => {
                 let table = if compensation {
                     LightTable::Compensated(CompensatedTable::new(environment))
                 } else {
                     LightTable::Full
                 };
-                Self::Mis(MultipleImportanceSampling::new(
+                let mis = MultipleImportanceSampling::new(
                     environment,
                     table,
                     heuristic,
                     n_environment,
                     n_brdf,
-                )?)
+                )?;
+                Self::Mis(mis.with_portal_samples(n_portal))
             }
             StrategySpec::Product { n_rays } => {
                 Self::Product(ProductSampling::new(environment, n_rays))

@@ -141,7 +141,8 @@ impl SamplingImportanceResampling<'_> {
             chosen.n += 1;
         }
         let (environment, light) = (self.environment, self.environment.light_density());
-        MultiSample { environment, light, n_light, n_brdf, heuristic: Heuristic::Balance }
+        let n_portal = Count::fixed(0);
+        MultiSample { environment, light, n_light, n_brdf, n_portal, heuristic: Heuristic::Balance }
     }
 
     /// Draws the candidates of positive weight into scratch memory.

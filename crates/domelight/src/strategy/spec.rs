@@ -40,6 +40,8 @@ pub enum StrategySpec {
         n_environment: u32,
         /// BRDF samples per camera sample, up to 65,536.
         n_brdf: u32,
+        /// Samples of points on portals per camera sample, up to 65,536, in scenes that have any.
+        n_portal: u32,
         /// The heuristic for the MIS weights.
         heuristic: Heuristic,
         /// Whether radiance below the mean is left to the BRDF samples, which requires at least one.
@@ -283,6 +285,12 @@ const MIS: StrategyDeclaration = StrategyDeclaration {
             help: "environment and BRDF samples, in place of rays",
         },
         StrategyParameter::named("heuristic", &HEURISTICS, "how samples are weighted"),
+        StrategyParameter {
+            name: "portals",
+            values: ParameterValues::Count(MAX_RAYS),
+            default: "",
+            help: "samples of points on portals beside the others, in scenes that have any",
+        },
         StrategyParameter {
             name: "no-compensation",
             values: ParameterValues::Flag,
@@ -550,7 +558,7 @@ impl StrategySpec {
     /// from their variance.
     pub fn draws_from_the_bsdf_alone(&self) -> bool {
         match self {
-            Self::Brdf { .. } | Self::Mis { n_environment: 0, .. } => true,
+            Self::Brdf { .. } | Self::Mis { n_environment: 0, n_portal: 0, .. } => true,
             Self::Rejection { proposal, .. } => *proposal == Proposal::Brdf,
             Self::Sir { candidates, .. } => *candidates == Candidates::Brdf,
             _ => false,
@@ -596,6 +604,7 @@ impl StrategySpec {
         Ok(Self::Mis {
             n_environment,
             n_brdf,
+            n_portal: given.number("portals").unwrap_or(0),
             heuristic: given.named("heuristic", &HEURISTICS),
             // Without BRDF samples, the dim light would be lost.
             compensation: given.get("no-compensation").is_none() && n_brdf > 0,
@@ -659,7 +668,9 @@ impl StrategySpec {
             Self::Brdf { n_samples } | Self::Environment { n_samples } => n_samples,
             Self::Product { n_rays } => n_rays,
             Self::Rejection { stop: StoppingRule::Tries(n), .. } => n,
-            Self::Mis { n_environment, n_brdf, .. } => n_environment.max(n_brdf),
+            Self::Mis { n_environment, n_brdf, n_portal, .. } => {
+                n_environment.max(n_brdf).max(n_portal)
+            }
             Self::Sir { n_candidates, n_samples, .. } => n_candidates.unwrap_or(n_samples),
             // These use independent random numbers, or none.
             Self::Rejection { stop: StoppingRule::Accepted { .. }, .. }
@@ -675,11 +686,15 @@ impl StrategySpec {
             Self::Environment { n_samples } => {
                 format!("environment, {n_samples} per camera sample")
             }
-            Self::Mis { n_environment, n_brdf, heuristic, compensation } => format!(
-                "mis {n_environment}:{n_brdf}, {} heuristic{}",
-                HEURISTICS.name(heuristic),
-                if compensation { ", compensated" } else { "" }
-            ),
+            Self::Mis { n_environment, n_brdf, n_portal, heuristic, compensation } => {
+                let portals = match n_portal {
+                    0 => String::new(),
+                    n => format!(", {n} of portals"),
+                };
+                let heuristic = HEURISTICS.name(heuristic);
+                let compensated = if compensation { ", compensated" } else { "" };
+                format!("mis {n_environment}:{n_brdf}{portals}, {heuristic} heuristic{compensated}")
+            }
             Self::Product { n_rays } => format!("product, up to {n_rays} per camera sample"),
             Self::Rejection { proposal, stop } => {
                 let from = match proposal {
@@ -735,8 +750,11 @@ impl fmt::Display for StrategySpec {
             Self::MedianCut { n_lights } | Self::VarianceMinimization { n_lights } => {
                 write!(f, ":{n_lights}")
             }
-            Self::Mis { n_environment, n_brdf, heuristic, compensation } => {
+            Self::Mis { n_environment, n_brdf, n_portal, heuristic, compensation } => {
                 write!(f, ":{n_environment}:{n_brdf}")?;
+                if n_portal > 0 {
+                    write!(f, ":portals={n_portal}")?;
+                }
                 if heuristic != Heuristic::Power {
                     write!(f, ":heuristic={}", HEURISTICS.name(heuristic))?;
                 }
@@ -802,6 +820,7 @@ mod tests {
             ("env", "environment:1"),
             ("mis", "mis:1:1"),
             ("mis:3", "mis:2:1"),
+            ("mis:3:portals=4", "mis:2:1:portals=4"),
             ("mis:3/1:heuristic=balance", "mis:3:1:heuristic=balance"),
             ("mis:split=3/1:heuristic=balance", "mis:3:1:heuristic=balance"),
             ("mis:1:1:no-compensation", "mis:1:1:no-compensation"),
@@ -833,6 +852,7 @@ mod tests {
             StrategyKind::Mis => StrategySpec::Mis {
                 n_environment: n - 1,
                 n_brdf: n,
+                n_portal: if coin { n } else { 0 },
                 heuristic: pick(pcg, &HEURISTICS),
                 compensation: coin,
             },

@@ -21,7 +21,8 @@ const SIZE: [usize; 2] = [128, 128];
 const MATERIALS: [&str; 2] = ["diffuse:0.7", "ggx:0.2"];
 /// Camera samples of the measured pictures.
 const SAMPLES: [u32; 2] = [4, 16];
-const STRATEGIES: [&str; 2] = ["mis:4:4", "product:4"];
+/// Without portals, and with them, where the second is the usual way to sample them.
+const STRATEGIES: [&[&str]; 2] = [&["mis:4:4", "product:4"], &["mis:1:1:portals=4", "product:4"]];
 /// A reference's strategy, and the camera samples of each of its halves.
 const REFERENCE: &str = "product:8";
 const REFERENCE_SAMPLES: u32 = 1024;
@@ -143,10 +144,8 @@ impl<'a> InteriorCase<'a> {
     fn measure(&self, bench: &Bench) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
         for samples in SAMPLES {
-            for strategy in STRATEGIES {
-                // Only this strategy uses portals.
-                let n_scenes = if strategy.starts_with("product") { self.scenes.len() } else { 1 };
-                for scene in 0..n_scenes {
+            for (scene, strategies) in STRATEGIES.iter().enumerate().take(self.scenes.len()) {
+                for strategy in *strategies {
                     rows.push(self.measure_one(bench, strategy, scene, samples)?);
                 }
             }
