@@ -11,8 +11,9 @@
 //! weights that divide the light between strata, BRDF samples and portals, unlike what the tile learns itself.
 
 use super::cells::{CellArray, Cells, TABLE_ROWS, ZERO_CELLS};
+use super::prior::for_each_prior;
 use super::table::{BLIND, LEFT_OF_GLOSSY};
-use super::visibility::{VisibilityStats, for_each_prior};
+use super::visibility::VisibilityStats;
 use crate::math::Vec3;
 use crate::simd::{InstructionSet, Kernel, LANES, Simd, SimdF32x8, SimdFloat, dispatch};
 

@@ -46,7 +46,8 @@ impl Kernel for TileEstimator<'_, '_> {
         if !pilots {
             let ProductScratch { visibility, visibility_stats, briefing, .. } = &mut *self.scratch;
             let has_portals = !tile.portals.is_empty();
-            visibility.estimate(simd, self.cells, visibility_stats, briefing, blocks, has_portals);
+            let scouts = (&briefing.counts, briefing.everywhere.as_deref());
+            visibility.estimate(simd, self.cells, visibility_stats, scouts, blocks, has_portals);
         }
         self.scratch.targets.clear();
         self.scratch.sampled_pixels.clear();

@@ -41,6 +41,7 @@ mod estimator;
 mod hits;
 mod light_samples;
 mod portal_light;
+mod prior;
 mod rays;
 mod strata;
 mod systematic;

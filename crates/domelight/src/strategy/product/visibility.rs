@@ -18,10 +18,10 @@
 //! Its expectation does not depend on V̂, provided that V̂ does not depend on the random numbers of strata and
 //! selection. For that reason, V̂ comes only from pixels of lower levels.
 
-use super::briefing::Briefing;
 use super::cells::{CellArray, Cells, MAX_ROWS, ZERO_CELLS, get_mut};
 use super::portal_light::PORTAL_ROW;
-use crate::simd::{LANES, Lanes, Simd, SimdF32x8, SimdFloat};
+use super::prior::{Prior, for_each_prior};
+use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat};
 
 /// The number of pixels along the side of a block.
 pub(super) const BLOCK: usize = 4;
@@ -29,13 +29,6 @@ pub(super) const BLOCK: usize = 4;
 const NEIGHBOR: f32 = 0.35;
 /// The weight of a ray to a neighboring cell.
 const BESIDE: f32 = 0.25;
-
-/// The number of cells along the curve that know about each other's visibility.
-const GROUP: usize = 16;
-/// The visibility below which cells are known to be dark.
-const DARK: f32 = 0.1;
-/// s of cells that nobody has seen.
-const LEAST_DOUBT: f32 = 0.003;
 
 /// The statistics of a tile.
 #[derive(Clone, Debug, Default)]
@@ -120,14 +113,14 @@ pub(super) struct VisibilityEstimate {
 }
 
 impl VisibilityEstimate {
-    /// Computes the estimates.
+    /// Computes the estimates, from the tile's rays, those of scouts near it, and the visibility from all scouts.
     #[inline(always)]
     pub(super) fn estimate<S: Simd>(
         &mut self,
         simd: S,
         cells: &Cells,
         visibility_stats: &VisibilityStats,
-        briefing: &Briefing,
+        (of_scouts, everywhere): (&[CellArray; 2], Option<&CellArray>),
         blocks: Blocks,
         has_portals: bool,
     ) {
@@ -138,7 +131,7 @@ impl VisibilityEstimate {
         let (mut n, mut k) = (simd.splat(0.0), simd.splat(0.0));
         let mut tile = [[[0.0; LANES]; 2]; MAX_ROWS];
         for (row, [n_cells, k_cells]) in cells.rows().zip(&mut tile) {
-            let [scouts_n, scouts_k] = briefing.counts.each_ref().map(|c| simd.load(&c[row]));
+            let [scouts_n, scouts_k] = of_scouts.each_ref().map(|c| simd.load(&c[row]));
             let n_row = sum(simd, rays, row) + scouts_n;
             let k_row = sum(simd, free, row) + scouts_k;
             (n, k) = (n + n_row, k + k_row);
@@ -146,7 +139,7 @@ impl VisibilityEstimate {
         }
         let all = simd.splat((k.sum() + 1.0) / (n.sum() + 2.0));
         let mut priors = [Prior::PORTAL; MAX_ROWS];
-        let everywhere = |row| match &briefing.everywhere {
+        let everywhere = |row| match everywhere {
             Some(visible) => simd.load(&visible[row]),
             None => all,
         };
@@ -175,55 +168,6 @@ impl VisibilityEstimate {
     /// V̂ of the cells from a block, and their standard deviations, by slot.
     pub(super) fn of(&self, block: usize) -> (&CellArray, &CellArray) {
         (&self.visible[block], &self.std_dev[block])
-    }
-}
-
-/// What the rays of a whole tile and its scouts say about the visibility of a row of cells.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Prior {
-    /// p.
-    pub(super) visible: Lanes,
-    /// s.
-    doubt: Lanes,
-}
-
-impl Prior {
-    /// That of portals, which are meant to be seen.
-    const PORTAL: Self = Self { visible: [1.0; LANES], doubt: [1.0; LANES] };
-
-    /// g² of cells with visibility `v` by `n` rays.
-    #[inline(always)]
-    pub(super) fn variance<S: Simd>(&self, simd: S, n: S::F32x8, v: S::F32x8) -> S::F32x8 {
-        let one = simd.splat(1.0);
-        let (p, s) = (simd.load(&self.visible), simd.load(&self.doubt));
-        let differ = simd.splat(0.5) * p * (one - p) + simd.splat(0.005) * s;
-        v * (one - v) + (differ / (n + one) + simd.splat(0.0003) * s)
-    }
-}
-
-/// Calls `of_row` for each row of cells, with [N, K] in `counts`. `all` is v₀.
-#[inline(always)]
-pub(super) fn for_each_prior<S: Simd>(
-    simd: S,
-    counts: &[[Lanes; 2]],
-    everywhere: impl Fn(usize) -> S::F32x8,
-    mut of_row: impl FnMut(usize, Prior),
-) {
-    let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
-    for (group, rows) in counts.chunks(GROUP).enumerate() {
-        let (mut n_group, mut k_group) = (zero, zero);
-        for [n, k] in rows {
-            (n_group, k_group) = (n_group + simd.load(n), k_group + simd.load(k));
-        }
-        for (i, [n, k]) in rows.iter().enumerate() {
-            let (n, k, all) = (simd.load(n), simd.load(k), everywhere(group * GROUP + i));
-            let others = ((k_group - k).max(zero) + all) / ((n_group - n).max(zero) + one);
-            let p = ((k + others) / (n + one)).min(one);
-            let doubt =
-                (others.max(p).max(all) * simd.splat(1.0 / DARK)).max(simd.splat(LEAST_DOUBT));
-            let doubt = doubt.min(one).store();
-            of_row(group * GROUP + i, Prior { visible: p.store(), doubt });
-        }
     }
 }
 
@@ -279,7 +223,8 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> VisibilityEstimate {
             let mut visibility = VisibilityEstimate::default();
-            visibility.estimate(simd, self.0, self.1, &Briefing::default(), self.2, false);
+            let no_scouts = (&[ZERO_CELLS; 2], None);
+            visibility.estimate(simd, self.0, self.1, no_scouts, self.2, false);
             visibility
         }
     }
