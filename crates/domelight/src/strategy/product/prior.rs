@@ -15,11 +15,11 @@ pub(super) struct Prior {
     /// p.
     pub(super) visible: Lanes,
     /// s.
-    doubt: Lanes,
+    pub(super) doubt: Lanes,
 }
 
 impl Prior {
-    /// That of portals, which are meant to be seen.
+    /// That of portals, which are meant to be seen, and s where nothing is known.
     pub(super) const PORTAL: Self = Self { visible: [1.0; LANES], doubt: [1.0; LANES] };
 
     /// g² of cells with visibility `v` by `n` rays.

@@ -12,7 +12,8 @@
 //! p is the visibility of the cell over the whole tile, with K of N rays unoccluded, those of scouts (`briefing`)
 //! among them; q that of the other cells in its group along the curve, and v₀ that of all cells. g is the
 //! standard deviation of a ray around V̂ combined with the uncertainty of V̂ itself, which is large if the tile's
-//! rays to the cell differ, and small where neither the cell nor its group was ever seen: behind the walls of a room.
+//! rays to the cell differ, and small where neither the cell nor its group was ever seen: behind the walls of a room. Without
+//! scouts, q is v₀ and s is 1.
 //!
 //! V̂ is a control variate: the pixel's estimate is the light seen through V̂ that it reflects, plus Σ W (V − V̂)/π.
 //! Its expectation does not depend on V̂, provided that V̂ does not depend on the random numbers of strata and
@@ -139,11 +140,20 @@ impl VisibilityEstimate {
         }
         let all = simd.splat((k.sum() + 1.0) / (n.sum() + 2.0));
         let mut priors = [Prior::PORTAL; MAX_ROWS];
-        let everywhere = |row| match everywhere {
-            Some(visible) => simd.load(&visible[row]),
-            None => all,
-        };
-        for_each_prior(simd, &tile[..n_rows], everywhere, |row, prior| priors[row] = prior);
+        let mut of_row = |row, prior| priors[row] = prior;
+        match everywhere {
+            Some(visible) => {
+                let everywhere = |row: usize| simd.load(&visible[row]);
+                for_each_prior(simd, &tile[..n_rows], everywhere, &mut of_row);
+            }
+            None => {
+                // Nobody but the tile's own rays knows more than the mean of all cells.
+                for (row, [n, k]) in tile[..n_rows].iter().enumerate() {
+                    let p = (simd.load(k) + all) / (simd.load(n) + one);
+                    of_row(row, Prior { visible: p.store(), ..Prior::PORTAL });
+                }
+            }
+        }
         let mut of_portals = Prior::PORTAL;
         if let Some(row) = portals {
             let [n, k] = [sum(simd, rays, row), sum(simd, free, row)];
