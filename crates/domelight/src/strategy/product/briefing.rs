@@ -7,7 +7,7 @@
 //! w = 1/(1 + d²/(0.3 r)²)³        r: the root mean square distance of all windows from their center
 //! ```
 //!
-//! are added to those of the tile. What scouts say about a cell does not depend on the pass's pool. So it may enter the
+//! are added to those of the tile, up to 16 rays to each cell. What scouts say about a cell does not depend on the pass's pool. So it may enter the
 //! weights that divide the light between strata, BRDF samples and portals, unlike what the tile learns itself.
 
 use super::cells::{CellArray, Cells, TABLE_ROWS, ZERO_CELLS};
@@ -33,7 +33,7 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// The rays of a window. `positions` is the sum of positions, and their number.
+    /// The rays of a window, with the sum of its positions and their number.
     pub(super) fn new(stats: &VisibilityStats, (sum, n): (Vec3, usize)) -> Self {
         let mut counts = Box::new([ZERO_CELLS; 2]);
         for (sums, blocks) in counts.iter_mut().zip([&stats.rays, &stats.free]) {

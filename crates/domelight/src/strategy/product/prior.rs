@@ -32,7 +32,7 @@ impl Prior {
     }
 }
 
-/// Calls `of_row` for each row of cells, with [N, K] in `counts`. `all` is v₀.
+/// Calls `of_row` for each row of cells, with [N, K] in `counts`. `everywhere` has the v₀ of a row.
 #[inline(always)]
 pub(super) fn for_each_prior<S: Simd>(
     simd: S,

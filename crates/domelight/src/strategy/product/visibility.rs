@@ -6,14 +6,14 @@
 //!
 //! ```text
 //! V̂ = (k + p)/(n + 1)        p = (K + q)/(N + 1)        q = (K' + v₀)/(N' + 1)
-//! g² = V̂(1 − V̂) + (p(1 − p)/2 + 0.005 s)/(n + 1) + 0.0003 s        s = max(p, q)/0.1 within [0.003, 1]
+//! g² = V̂(1 − V̂) + (p(1 − p)/2 + 0.005 s)/(n + 1) + 0.0003 s        s = max(p, q, v₀)/0.1 within [0.003, 1]
 //! ```
 //!
 //! p is the visibility of the cell over the whole tile, with K of N rays unoccluded, those of scouts (`briefing`)
-//! among them; q that of the other cells in its group along the curve, and v₀ that of all cells. g is the
-//! standard deviation of a ray around V̂ combined with the uncertainty of V̂ itself, which is large if the tile's
-//! rays to the cell differ, and small where neither the cell nor its group was ever seen: behind the walls of a room. Without
-//! scouts, q is v₀ and s is 1.
+//! among them; q that of the other cells in its group along the curve, and v₀ that of the cell from all scouts of the
+//! picture. g is the standard deviation of a ray around V̂ combined with the uncertainty of V̂ itself, which is large if
+//! the tile's rays to the cell differ, and small where nobody has ever seen the light: behind the walls of a room.
+//! Without scouts, v₀ and q are the visibility of all cells, and s is 1.
 //!
 //! V̂ is a control variate: the pixel's estimate is the light seen through V̂ that it reflects, plus Σ W (V − V̂)/π.
 //! Its expectation does not depend on V̂, provided that V̂ does not depend on the random numbers of strata and
