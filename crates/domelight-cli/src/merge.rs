@@ -22,7 +22,7 @@ use crate::args::MergeArguments;
 use crate::error::status;
 use crate::memory;
 use crate::output::{PicturePath, print_json, require_one_on_standard_output};
-use crate::render_run::{or_none, read};
+use crate::render_run::{or_none, read, spelled};
 use crate::terminal::Terminal;
 use crate::tone::Shown;
 use domelight_lab::Host as _;
@@ -166,6 +166,7 @@ impl Merged {
     fn require_same(&self, name: &str, part: &Checkpoint) -> Result<(), MergeError> {
         let foreign = |what: &str, here: &str, there: &str| {
             let first = &self.name;
+            let what = spelled(what);
             let text = format!(
                 "{name} belongs to another render: its {what} is {}, that of {first} {}",
                 or_none(here),

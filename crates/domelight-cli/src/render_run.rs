@@ -176,6 +176,11 @@ pub(crate) fn read(path: &Path) -> Result<Checkpoint> {
     Checkpoint::decode(&bytes).with_context(name)
 }
 
+/// The name of a field as the command line spells it, for messages.
+pub(crate) fn spelled(field: &str) -> String {
+    field.replace('_', "-")
+}
+
 /// A value of a render's identity, for messages.
 pub(crate) fn or_none(value: &str) -> &str {
     if value.is_empty() { "none" } else { value }
@@ -186,7 +191,7 @@ fn require_same(path: &Path, checkpoint: &Checkpoint, identity: &[(String, Strin
     let text = format!(
         "{} belongs to another render: its {} is {}, that of this render {}",
         path.display(),
-        difference.name,
+        spelled(difference.name),
         or_none(difference.here),
         or_none(difference.there)
     );
