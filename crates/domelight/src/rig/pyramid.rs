@@ -25,6 +25,25 @@ pub(super) struct Node {
     pub(super) second: [[f32; 6]; 3],
 }
 
+/// A block of a level, or a texel or part of one.
+#[derive(Clone, Copy)]
+pub(super) enum Place {
+    Block { level: usize, x: usize, y: usize },
+    Texel { depth: usize, x: usize, y: usize },
+}
+
+impl Place {
+    /// The four parts of a texel or of a part of one.
+    #[inline(always)]
+    pub(super) fn parts(depth: usize, x: usize, y: usize) -> [Self; 4] {
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| Self::Texel {
+            depth: depth + 1,
+            x: 2 * x + dx,
+            y: 2 * y + dy,
+        })
+    }
+}
+
 /// The nodes of one level, row by row.
 #[derive(Clone, Debug)]
 pub(super) struct Level {
@@ -48,6 +67,26 @@ pub(super) struct Pyramid<'a> {
 }
 
 impl<'a> Pyramid<'a> {
+    /// Adds the parts of a block to the places to visit.
+    #[inline(always)]
+    pub(super) fn open_block(&self, level: usize, x: usize, y: usize, places: &mut Vec<Place>) {
+        if let Some(below) = level.checked_sub(1) {
+            let finer = &self.levels[below];
+            for y in 2 * y..finer.rows.min(2 * y + 2) {
+                for x in 2 * x..finer.columns.min(2 * x + 2) {
+                    places.push(Place::Block { level: below, x, y });
+                }
+            }
+            return;
+        }
+        let (block, map) = (self.block, self.map);
+        for y in y * block..map.height.min((y + 1) * block) {
+            for x in x * block..map.width.min((x + 1) * block) {
+                places.push(Place::Texel { depth: 0, x, y });
+            }
+        }
+    }
+
     /// Texels are divided until their parts are about as small as `finest` \[rad\].
     pub(super) fn new(map: &'a RgbImage, finest: f64) -> Self {
         let RgbImage { width, height, .. } = *map;

@@ -357,8 +357,8 @@ pub trait Strategy: Sync {
         out: &mut Contributions,
     );
 
-    /// Learns from the rays of a round, unless it was the last of a tile that nobody asks for its findings. `visibility`
-    /// has the V in [0, 1] of each pushed ray.
+    /// Learns from the rays of a round; after the last round, only in windows of scouts. `visibility` has the V in [0, 1] of
+    /// each pushed ray.
     fn learn(
         &self,
         _tile: &TileShading,

@@ -1,5 +1,5 @@
-//! Samples of light, BRDF and portals at one point or at several side by side: Veach & Guibas 1995, equation 10 (the multi-sample
-//! model; the weights sum to one for each direction).
+//! Samples of light, BRDF and portals at one point or at several side by side: Veach & Guibas 1995, equation 10 (the
+//! multi-sample model; the weights sum to one for each direction).
 //!
 //! All strategies of independent samples draw them here: BRDF and environment sampling have samples of one technique, and
 //! the candidates of resampling are weighted by the balance heuristic.

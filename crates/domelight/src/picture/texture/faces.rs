@@ -132,6 +132,11 @@ pub(super) struct FaceBytes<'a> {
     faces: [&'a [u8]; 6],
 }
 
+/// The bytes of a face.
+fn face_bytes(format: TexelFormat, size: usize) -> u64 {
+    (size as u64).saturating_mul(size as u64).saturating_mul(format.bytes() as u64)
+}
+
 impl<'a> FaceBytes<'a> {
     /// Six faces in one piece of `length` bytes.
     pub(super) fn new(
@@ -141,7 +146,7 @@ impl<'a> FaceBytes<'a> {
         start: u64,
         length: u64,
     ) -> Result<Self, TextureErrorKind> {
-        let face = (size as u64).saturating_mul(size as u64).saturating_mul(format.bytes() as u64);
+        let face = face_bytes(format, size);
         let expected = face.saturating_mul(6);
         if length != expected {
             return Err(TextureErrorKind::Length { columns: size, length, expected });
@@ -157,7 +162,7 @@ impl<'a> FaceBytes<'a> {
         start: u64,
         stride: u64,
     ) -> Result<Self, TextureErrorKind> {
-        let face = (size as u64).saturating_mul(size as u64).saturating_mul(format.bytes() as u64);
+        let face = face_bytes(format, size);
         let end = start.saturating_add(stride.saturating_mul(5)).saturating_add(face);
         let length = bytes.len();
         if end > length as u64 {

@@ -18,7 +18,7 @@
 use super::lobe::Lobe;
 use crate::math::{PI, Vec3};
 use crate::rig::geometry::Shape;
-use crate::rig::pyramid::{Node, Pyramid};
+use crate::rig::pyramid::{Node, Place, Pyramid};
 use crate::simd::{Kernel, LANES, LaneMask as _, Lanes, Simd, SimdF32x8, SimdFloat, Vectors};
 
 /// The bound on the error of a node, as a fraction of what it adds.
@@ -75,13 +75,6 @@ fn inverse_of<F: SimdF32x8>(rough: F, mean: f32) -> F {
     }
 }
 
-/// A block of a level, or a texel or part of one.
-#[derive(Clone, Copy)]
-enum Place {
-    Block { level: usize, x: usize, y: usize },
-    Texel { depth: usize, x: usize, y: usize },
-}
-
 /// One traversal, coarse without 1 over the estimate of each channel.
 #[inline(always)]
 fn pass<F: SimdF32x8>(
@@ -106,7 +99,7 @@ fn pass<F: SimdF32x8>(
                     continue;
                 }
                 if view.opens(lobe, &node.shape, node.energy, inverse_estimate) {
-                    open_block(pyramid, level, x, y, places);
+                    pyramid.open_block(level, x, y, places);
                 } else {
                     add_block(n, node, &view.terms(lobe), &mut sums);
                 }
@@ -126,13 +119,7 @@ fn pass<F: SimdF32x8>(
                 let energy = [0, 1, 2].map(|c| radiance[c] * row.shape.solid_angle);
                 let is_last = depth + 1 == pyramid.divisions.len();
                 if !is_last && view.opens(lobe, &row.shape, energy, inverse_estimate) {
-                    for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                        places.push(Place::Texel {
-                            depth: depth + 1,
-                            x: 2 * x + dx,
-                            y: 2 * y + dy,
-                        });
-                    }
+                    places.extend(Place::parts(depth, x, y));
                     continue;
                 }
                 let splat = |x: f32| n.x.splat(x);
@@ -156,26 +143,6 @@ fn pass<F: SimdF32x8>(
         }
     }
     sums
-}
-
-/// Adds the parts of a block to the places to visit.
-#[inline(always)]
-fn open_block(pyramid: &Pyramid, level: usize, x: usize, y: usize, places: &mut Vec<Place>) {
-    if let Some(below) = level.checked_sub(1) {
-        let finer = &pyramid.levels[below];
-        for y in 2 * y..finer.rows.min(2 * y + 2) {
-            for x in 2 * x..finer.columns.min(2 * x + 2) {
-                places.push(Place::Block { level: below, x, y });
-            }
-        }
-        return;
-    }
-    let (block, map) = (pyramid.block, pyramid.map);
-    for y in y * block..map.height.min((y + 1) * block) {
-        for x in x * block..map.width.min((x + 1) * block) {
-            places.push(Place::Texel { depth: 0, x, y });
-        }
-    }
 }
 
 /// Adds the integral of the polynomial over a node.

@@ -7,7 +7,7 @@
 use super::product::{Kernel, Linear, dot};
 use crate::math::{Vec3, functions};
 use crate::rig::geometry::Row;
-use crate::rig::pyramid::{Node, Pyramid};
+use crate::rig::pyramid::{Node, Place, Pyramid};
 use crate::rig::spherical_harmonics::harmonics;
 
 /// The largest (√λ r)³ G of a node that is not opened.
@@ -20,13 +20,6 @@ const NEGLIGIBLE: f64 = 25.0;
 pub(super) struct LightMoments {
     zeroth: [f64; 3],
     first: [[f64; 3]; 3],
-}
-
-/// A block of a level, or a texel or part of one.
-#[derive(Clone, Copy)]
-enum Place {
-    Block { level: usize, x: usize, y: usize },
-    Texel { depth: usize, x: usize, y: usize },
 }
 
 /// What is done with a node.
@@ -51,7 +44,7 @@ impl LightMoments {
                     }
                     match visit(kernel, node.direction, node.shape.radius) {
                         Visit::Skip => {}
-                        Visit::Open => open(pyramid, level, x, y, &mut places),
+                        Visit::Open => pyramid.open_block(level, x, y, &mut places),
                         Visit::Add => sums.add(kernel, node),
                     }
                 }
@@ -65,14 +58,7 @@ impl LightMoments {
                     let is_last = depth + 1 == pyramid.divisions.len();
                     match visit(kernel, direction(row, meridian), row.shape.radius) {
                         Visit::Skip => {}
-                        Visit::Open if !is_last => {
-                            let parts = [(0, 0), (1, 0), (0, 1), (1, 1)];
-                            places.extend(parts.map(|(dx, dy)| Place::Texel {
-                                depth: depth + 1,
-                                x: 2 * x + dx,
-                                y: 2 * y + dy,
-                            }));
-                        }
+                        Visit::Open if !is_last => places.extend(Place::parts(depth, x, y)),
                         Visit::Open | Visit::Add => {
                             sums.add(kernel, &texel(row, meridian, radiance));
                         }
@@ -180,23 +166,6 @@ fn texel(row: &Row, [x, z]: [f32; 2], radiance: [f32; 3]) -> Node {
         energy: radiance.map(|l| l * row.shape.solid_angle),
         first: radiance.map(|l| first.map(|m| l * m)),
         second: radiance.map(|l| second.map(|m| l * m)),
-    }
-}
-
-/// Adds the parts of a block to the places to visit.
-fn open(pyramid: &Pyramid, level: usize, x: usize, y: usize, places: &mut Vec<Place>) {
-    if let Some(below) = level.checked_sub(1) {
-        let finer = &pyramid.levels[below];
-        for y in 2 * y..finer.rows.min(2 * y + 2) {
-            let xs = 2 * x..finer.columns.min(2 * x + 2);
-            places.extend(xs.map(|x| Place::Block { level: below, x, y }));
-        }
-        return;
-    }
-    let (block, map) = (pyramid.block, pyramid.map);
-    for y in y * block..map.height.min((y + 1) * block) {
-        let xs = x * block..map.width.min((x + 1) * block);
-        places.extend(xs.map(|x| Place::Texel { depth: 0, x, y }));
     }
 }
 

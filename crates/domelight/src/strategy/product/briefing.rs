@@ -7,8 +7,9 @@
 //! w = 1/(1 + d²/(0.3 r)²)³        r: the root mean square distance of all windows from their center
 //! ```
 //!
-//! are added to those of the tile, up to 16 rays to each cell. What scouts say about a cell does not depend on the pass's pool. So it may enter the
-//! weights that divide the light between strata, BRDF samples and portals, unlike what the tile learns itself.
+//! are added to those of the tile, up to 16 rays to each cell. What scouts say about a cell does not depend on the pass's
+//! pool. So it may enter the weights that divide the light between strata, BRDF samples and portals, unlike what the tile
+//! learns itself.
 
 use super::cells::{CellArray, Cells, TABLE_ROWS, ZERO_CELLS};
 use super::prior::for_each_prior;
