@@ -16,7 +16,7 @@ pub struct Rgb {
 }
 
 /// Added to R² in the denominator of relMSE, as most papers on sampling do, so that dark pixels do not dominate.
-#[cfg(feature = "render")]
+#[cfg(any(feature = "picture", feature = "render"))]
 pub(crate) const REGULARIZER: f64 = 0.01;
 
 impl Rgb {

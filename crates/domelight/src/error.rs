@@ -40,11 +40,11 @@ pub enum Error {
     #[error(transparent)]
     Load(#[from] crate::scene::LoadError),
     /// A file that is not a valid environment.
-    #[cfg(feature = "io")]
+    #[cfg(feature = "picture")]
     #[error(transparent)]
     Probe(#[from] crate::environment::io::ProbeError),
     /// A picture that cannot be read or written.
-    #[cfg(feature = "io")]
+    #[cfg(feature = "picture")]
     #[error(transparent)]
     Picture(#[from] crate::picture::PictureError),
     /// A file that is not a valid checkpoint.

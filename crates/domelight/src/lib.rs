@@ -58,9 +58,13 @@
 //! ```
 //!
 //! # Features
-//! `render` (default): scenes, ray tracing, the renderer. `io` (default): readers and writers for
-//! pictures, probes and scenes. Without these features, the library is only the sampling core:
-//! [`math`], [`sampling`], [`bsdf`], [`environment`], [`strategy`], [`rig`].
+//! - `io` (default): files of all kinds: pictures, probes, meshes and scenes, films and rigs. It has `picture` and `render`.
+//! - `render` (default): scenes, ray tracing, the renderer; loops run in parallel.
+//! - `picture`: reads Radiance, OpenEXR, PFM and cube textures (not PNG and JPEG) as pictures and probes, without scenes
+//!   and ray tracing: `examples/sample_a_file.rs`.
+//!
+//! Without features, the library is only the sampling core: [`math`], [`sampling`], [`bsdf`], [`environment`],
+//! [`strategy`], [`rig`].
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))] // See `math::functions`.
 
@@ -93,11 +97,11 @@ pub mod prelude;
 pub mod files;
 #[cfg(feature = "io")]
 pub mod fingerprint;
-#[cfg(feature = "io")]
+#[cfg(feature = "picture")]
 mod load;
-#[cfg(feature = "io")]
+#[cfg(feature = "picture")]
 pub mod memory;
-#[cfg(feature = "io")]
+#[cfg(feature = "picture")]
 pub mod picture;
 #[cfg(feature = "io")]
 pub mod quote;

@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::Error;
 use crate::environment::Environment;
 use crate::environment::io::{ProbeOptions, load_probe, probe_from_bytes};
+#[cfg(feature = "io")]
 use crate::scene::{self, LoadOptions, Resolver, Scene, SceneFormat};
 
 impl Environment {
@@ -28,6 +29,7 @@ impl Environment {
     }
 }
 
+#[cfg(feature = "io")]
 impl Scene {
     /// Loads a mesh or a scene file of any known format and builds it.
     ///

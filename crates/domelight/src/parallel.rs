@@ -11,6 +11,18 @@ pub(crate) fn in_order<R: Send>(n: usize, f: impl Fn(usize) -> R + Sync) -> Vec<
     (0..n).map(f).collect()
 }
 
+/// `f` of each item, in parallel with the feature `render`.
+#[cfg(feature = "picture")]
+pub(crate) fn map<T: Send, R: Send>(items: Vec<T>, f: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
+    #[cfg(feature = "render")]
+    {
+        use rayon::prelude::*;
+        items.into_par_iter().map(f).collect()
+    }
+    #[cfg(not(feature = "render"))]
+    items.into_iter().map(f).collect()
+}
+
 /// `f(i, chunk i)` of chunks of `len`, in parallel with the feature `render`.
 pub(crate) fn bands<T: Send>(slice: &mut [T], len: usize, f: impl Fn(usize, &mut [T]) + Sync) {
     #[cfg(feature = "render")]

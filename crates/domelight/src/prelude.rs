@@ -12,7 +12,7 @@ pub use crate::{
     scene::{Camera, CameraSettings, Scene, SceneDescription, builtin::BuiltinScene},
 };
 
-#[cfg(feature = "io")]
+#[cfg(feature = "picture")]
 pub use crate::picture::exposure::Exposure;
-#[cfg(feature = "io")]
+#[cfg(feature = "picture")]
 pub use crate::picture::tone::{ToneCurve, ToneMapping};

@@ -9,12 +9,19 @@ mod one_pixel;
 mod product_on_your_own_geometry;
 #[path = "../examples/render_file.rs"]
 mod render_file;
+#[path = "../examples/sample_a_file.rs"]
+mod sample_a_file;
 #[path = "../examples/your_own_bsdf.rs"]
 mod your_own_bsdf;
 
 #[test]
 fn render_file() {
     render_file::main().unwrap();
+}
+
+#[test]
+fn sample_a_file() {
+    sample_a_file::main().unwrap();
 }
 
 #[test]

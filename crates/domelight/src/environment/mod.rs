@@ -10,15 +10,15 @@ pub(crate) mod compact;
 mod compensation;
 pub mod convention;
 mod density;
-#[cfg(feature = "io")]
+#[cfg(feature = "picture")]
 mod guess;
-#[cfg(feature = "io")]
+#[cfg(feature = "picture")]
 pub mod io;
 mod key_light;
 pub(crate) mod lat_long;
 mod light_density;
 pub mod mapping;
-#[cfg(feature = "io")]
+#[cfg(feature = "picture")]
 mod repair;
 pub mod statistics;
 

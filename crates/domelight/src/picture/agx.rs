@@ -67,6 +67,7 @@ pub(super) fn shaped(light: f32) -> f32 {
 }
 
 /// Least and largest light that [`shaped`] distinguishes from black and white.
+#[cfg(feature = "io")]
 pub(super) fn range() -> (f32, f32) {
     (MIDDLE_GRAY * functions::exp2(DARKEST), MIDDLE_GRAY * functions::exp2(BRIGHTEST))
 }

@@ -30,6 +30,9 @@ pub enum PictureErrorKind {
         "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG, JPEG, KTX2, DDS), by its first bytes"
     )]
     UnknownFormat,
+    /// A format that the library reads with the feature `io` alone.
+    #[error("{0:?} is read with the feature io of the library, which this program does without")]
+    LeftOut(super::Format),
     /// An invalid header line.
     #[error("header line {line}: {found:?} is not {expected}")]
     Header {
@@ -130,6 +133,7 @@ pub enum PictureErrorKind {
     #[error("{0}")]
     Texture(#[from] TextureErrorKind),
     /// A decoder of the `image` crate refused the file.
+    #[cfg(feature = "io")]
     #[error("{0}")]
     Image(image::ImageError),
     /// The layers cannot be written as one OpenEXR part.

@@ -16,7 +16,7 @@ use super::compare::{SizeMismatch, check_sizes};
 use crate::color::Rgb;
 use crate::image::RgbImage;
 use crate::math::functions;
-use rayon::prelude::*;
+use crate::parallel::{bands, in_order};
 use std::ops::RangeInclusive;
 
 /// Pixels per degree of a 0.7 m wide 4K screen seen from 0.7 m: 3840 π / 180.
@@ -95,7 +95,7 @@ pub fn ldr_flip(
         let feature = functions::powf(edge.max(point) * std::f32::consts::FRAC_1_SQRT_2, Q_FEATURE);
         functions::powf(color, 1.0 - feature)
     };
-    Ok((0..reference.lab.len()).into_par_iter().map(difference).collect())
+    Ok(in_order(reference.lab.len(), difference))
 }
 
 /// Whether the pictures have a ꟻLIP.
@@ -127,12 +127,8 @@ pub fn hdr_flip(
     for i in 0..n {
         let exposure = start + (stop - start) * i as f32 / (n - 1) as f32;
         let shown = |picture: &RgbImage| {
-            let pixels = picture
-                .pixels
-                .par_iter()
-                .map(|&p| tone_map(p * functions::exp2(exposure)))
-                .collect();
-            RgbImage { pixels, ..*picture }
+            let pixel = |i: usize| tone_map(picture.pixels[i] * functions::exp2(exposure));
+            RgbImage { pixels: in_order(picture.pixels.len(), pixel), ..*picture }
         };
         let at_exposure = ldr_flip(&shown(reference), &shown(test), pixels_per_degree)?;
         map.iter_mut().zip(at_exposure).for_each(|(m, e)| *m = m.max(e));
@@ -224,18 +220,16 @@ impl Eye {
 
     fn see(&self, picture: &RgbImage) -> Seen {
         let width = picture.width;
-        let opponent: Vec<[f32; 3]> =
-            picture.pixels.par_iter().map(|&p| opponent_of_rgb(p)).collect();
+        let opponent = in_order(picture.pixels.len(), |i| opponent_of_rgb(picture.pixels[i]));
         let plane = |channel: usize| -> Vec<f32> { opponent.iter().map(|c| c[channel]).collect() };
         let planes = [plane(0), plane(1), plane(2)];
         let filtered = [0, 1, 2].map(|c| {
             let parts = self.sensitivity[c].iter().map(|kernel| filter(&planes[c], width, kernel));
             parts.reduce(|a, b| a.iter().zip(b).map(|(a, b)| a + b).collect()).unwrap_or_default()
         });
-        let lab = (0..opponent.len())
-            .into_par_iter()
-            .map(|i| hunt_lab(rgb_of_opponent([0, 1, 2].map(|c| filtered[c][i]))))
-            .collect();
+        let lab = in_order(opponent.len(), |i| {
+            hunt_lab(rgb_of_opponent([0, 1, 2].map(|c| filtered[c][i])))
+        });
         let achromatic: Vec<f32> = planes[0].iter().map(|y| (y + 16.0) / 116.0).collect();
         let strength = |kernel: &Separable| -> Vec<f32> {
             let along_x = filter(&achromatic, width, kernel);
@@ -286,7 +280,8 @@ fn balanced(kernel: Vec<f32>) -> Vec<f32> {
 fn filter(plane: &[f32], width: usize, kernel: &Separable) -> Vec<f32> {
     let mut rows = vec![0.0f32; plane.len()];
     let radius = kernel.x.len() / 2;
-    rows.par_chunks_mut(width).zip(plane.par_chunks(width)).for_each(|(out, row)| {
+    bands(&mut rows, width, |y, out| {
+        let row = &plane[y * width..(y + 1) * width];
         let (first, last) = (row[0], row[width - 1]);
         let ends = std::iter::repeat_n(first, radius).chain(row.iter().copied());
         let padded: Vec<f32> = ends.chain(std::iter::repeat_n(last, radius)).collect();
@@ -297,7 +292,7 @@ fn filter(plane: &[f32], width: usize, kernel: &Separable) -> Vec<f32> {
     let height = plane.len() / width;
     let radius = kernel.y.len() / 2;
     let mut columns = vec![0.0f32; plane.len()];
-    columns.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
+    bands(&mut columns, width, |y, out| {
         for (k, &weight) in kernel.y.iter().enumerate() {
             let from = (y + k).saturating_sub(radius).min(height - 1);
             let row = &rows[from * width..(from + 1) * width];

@@ -19,9 +19,12 @@ use super::primaries::{Primaries, to_light, xyz_of_white_to_rec709, xyz_to_rec70
 use super::{Format, Picture, PictureErrorKind, allocate, checked_area};
 use crate::environment::mapping::Fisheye;
 use crate::math::functions;
+use crate::parallel::bands;
 use crate::{Rgb, RgbImage};
-use rayon::prelude::*;
 use std::io::{self, Write};
+
+/// Scanlines that share the memory of one.
+const BAND_LINES: usize = 16;
 
 /// Decodes a whole file into linear Rec. 709, top row first.
 ///
@@ -41,15 +44,15 @@ pub fn decode(bytes: &[u8]) -> Result<Picture, PictureErrorKind> {
     let color = ColorTable::new(&header);
     let mut pixels = allocate(Rgb::BLACK, length, lines)?;
     debug_assert_eq!(pixels.len(), area);
-    pixels.par_chunks_exact_mut(length).zip(&starts).for_each_init(
-        || vec![[0u8; 4]; length],
-        |rgbe, (row, &start)| {
-            decode_scanline(&bytes[start..], rgbe);
-            for (pixel, &rgbe) in row.iter_mut().zip(rgbe.iter()) {
+    bands(&mut pixels, BAND_LINES * length, |band, rows| {
+        let mut rgbe = vec![[0u8; 4]; length];
+        for (row, &start) in rows.chunks_exact_mut(length).zip(&starts[band * BAND_LINES..]) {
+            decode_scanline(&bytes[start..], &mut rgbe);
+            for (pixel, &rgbe) in row.iter_mut().zip(&rgbe) {
                 *pixel = color.decode(rgbe);
             }
-        },
-    );
+        }
+    });
     let picture = Picture::opaque(header.upright(pixels), Format::Hdr);
     let (notes, fisheye) = (header.notes(), header.fisheye);
     Ok(Picture { notes, fisheye, warnings: header.warnings, ..picture })

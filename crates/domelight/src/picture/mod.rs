@@ -9,6 +9,7 @@
 
 mod agx;
 pub mod compare;
+#[cfg(feature = "io")]
 mod display;
 mod error;
 pub mod exposure;
@@ -16,11 +17,13 @@ pub mod exr;
 pub mod flip;
 pub mod hdr;
 pub mod pfm;
+#[cfg(feature = "io")]
 pub mod png;
 mod primaries;
 pub mod texture;
 pub mod tone;
 
+#[cfg(feature = "io")]
 pub use crate::files::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
 pub use error::{PictureError, PictureErrorKind};
 
@@ -224,9 +227,12 @@ pub fn read_bytes(
         Some(Format::Pfm) => pfm::decode(bytes).map(|image| Picture::opaque(image, Format::Pfm)),
         Some(Format::Ktx2) => texture::decode(bytes, Container::Ktx2),
         Some(Format::Dds) => texture::decode(bytes, Container::Dds),
+        #[cfg(feature = "io")]
         Some(format @ (Format::Png | Format::Jpeg)) => {
             png::decode_within(bytes, format, options.max_memory)
         }
+        #[cfg(not(feature = "io"))]
+        Some(format @ (Format::Png | Format::Jpeg)) => Err(PictureErrorKind::LeftOut(format)),
         None if bytes.is_empty() => Err(PictureErrorKind::NoBytes),
         None => Err(PictureErrorKind::UnknownFormat),
     };
@@ -245,7 +251,10 @@ pub fn memory_to_read(bytes: &[u8]) -> Result<u64, PictureErrorKind> {
         Some(Format::Pfm) => (pfm::texels(bytes)?, 12),
         Some(Format::Ktx2) => (texture::texels(bytes, Container::Ktx2)?, 12),
         Some(Format::Dds) => (texture::texels(bytes, Container::Dds)?, 12),
+        #[cfg(feature = "io")]
         Some(format @ (Format::Png | Format::Jpeg)) => (png::texels(bytes, format)?, 40),
+        #[cfg(not(feature = "io"))]
+        Some(Format::Png | Format::Jpeg) => (0, 0),
         None => (0, 0),
     };
     Ok(bytes.len() as u64 + texels as u64 * per_texel)

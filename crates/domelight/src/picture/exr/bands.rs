@@ -2,15 +2,14 @@
 
 use super::write::sort_attributes;
 use super::{Compression, ExrLayers, Plane};
+use crate::parallel::in_order;
 use crate::picture::PictureErrorKind;
-use ::exr::block::chunk::Chunk;
 use ::exr::block::writer::ChunksWriter;
 use ::exr::block::{self, BlockIndex, UncompressedBlock};
 use ::exr::error::Error;
 use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, Headers};
 use ::exr::prelude::{ChannelDescription, LineOrder, SampleType, SmallVec, Text, Vec2};
-use rayon::prelude::*;
 use std::borrow::Borrow;
 use std::io::{Cursor, Seek, SeekFrom, Write};
 
@@ -137,9 +136,9 @@ fn write_rows(
     };
     let starts: Vec<usize> = (0..band.height).step_by(rows).collect();
     for batch in starts.chunks(BATCH) {
-        let chunks = batch.par_iter().map(|&start| compress(start));
-        for (&start, chunk) in batch.iter().zip(chunks.collect::<Result<Vec<Chunk>, _>>()?) {
-            writer.write_chunk((y + start) / rows, chunk).map_err(error_kind)?;
+        let chunks = in_order(batch.len(), |i| compress(batch[i]));
+        for (&start, chunk) in batch.iter().zip(chunks) {
+            writer.write_chunk((y + start) / rows, chunk?).map_err(error_kind)?;
         }
     }
     Ok(())

@@ -16,7 +16,7 @@ use crate::picture::primaries::{to_light, xyz_to_rec709};
 use crate::picture::{
     Format, GuessedLayer, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area,
 };
-use crate::{Rgb, RgbImage};
+use crate::{Rgb, RgbImage, parallel};
 use ::exr::block::UncompressedBlock;
 use ::exr::block::chunk::{Chunk, CompressedBlock};
 use ::exr::block::lines::LineRef;
@@ -25,7 +25,6 @@ use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{Compression, SampleType, Text, f16};
 use half::slice::HalfFloatSliceExt;
-use rayon::prelude::*;
 use std::collections::HashSet;
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -169,11 +168,11 @@ fn decompress(
     batch: Vec<Chunk>,
     meta: &MetaData,
 ) -> Result<Vec<UncompressedBlock>, PictureErrorKind> {
-    let blocks = batch.into_par_iter().map(|chunk| {
+    let blocks = parallel::map(batch, |chunk| {
         check_dwa_sizes(&chunk, meta)?;
         UncompressedBlock::decompress_chunk(chunk, meta, false).map_err(PictureErrorKind::Exr)
     });
-    blocks.collect()
+    blocks.into_iter().collect()
 }
 
 /// Refuses a DWA block whose own header promises more than the block can make.
