@@ -8,8 +8,12 @@ use domelight::math::{Vec3, vec2};
 use domelight::picture::exr::ExrLayers;
 use domelight::sampling::Pcg32;
 
-pub(crate) fn main() -> Result<(), Error> {
-    let environment = match std::env::args().nth(1) {
+fn main() -> Result<(), Error> {
+    run(std::env::args().nth(1))
+}
+
+pub(crate) fn run(map: Option<String>) -> Result<(), Error> {
+    let environment = match map {
         Some(path) => Environment::load(path)?,
         None => Environment::from_bytes(&built_in_file()?)?,
     };

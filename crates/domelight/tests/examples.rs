@@ -9,6 +9,7 @@ mod one_pixel;
 mod product_on_your_own_geometry;
 #[path = "../examples/render_file.rs"]
 mod render_file;
+#[allow(dead_code, reason = "main reads the command line")]
 #[path = "../examples/sample_a_file.rs"]
 mod sample_a_file;
 #[path = "../examples/your_own_bsdf.rs"]
@@ -21,7 +22,7 @@ fn render_file() {
 
 #[test]
 fn sample_a_file() {
-    sample_a_file::main().unwrap();
+    sample_a_file::run(None).unwrap();
 }
 
 #[test]
