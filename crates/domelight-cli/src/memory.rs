@@ -46,10 +46,7 @@ pub(crate) const MAP_TEXEL: u64 = 24;
 /// For each texel of a map that is written: the map, its channels, the file.
 pub(crate) const WRITTEN_TEXEL: u64 = 24;
 
-/// For each pixel of a render: its sums, and the layers that they become.
-pub(crate) const PIXEL: u64 = 332;
-
-/// The same with a checkpoint, or of a part: the sums again, their bits and the file.
+/// For each pixel of a render with a checkpoint, or of a part: what a render takes, the sums again, their bits and the file.
 pub(crate) const SAVED_PIXEL: u64 = 776;
 
 /// For each pixel of a comparison of so many pictures: a render, the reference, what its page shows, and the pictures, each

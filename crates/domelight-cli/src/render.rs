@@ -5,7 +5,9 @@ use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
 use domelight::picture::tone::ToneMapping;
-use domelight::render::{Layers, RenderSettings, Rendering, automatic_exposure, pilot_points};
+use domelight::render::{
+    Film, Layers, RenderSettings, Rendering, automatic_exposure, pilot_points,
+};
 use domelight::scene::Camera;
 use domelight::strategy::PreparedStrategy;
 
@@ -56,7 +58,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     outputs.iter().try_for_each(PicturePath::declare)?;
     if !arguments.render_run.is_part() {
         // Check the memory before loading. `render_run` checks again, with what it saves.
-        memory::allow_picture(settings.width, settings.height, memory::PIXEL)?;
+        memory::allow_picture(settings.width, settings.height, Film::MEMORY_PER_PIXEL)?;
     }
     start_threads(arguments.threads.threads)?;
     // Before the work that would be in vain.

@@ -11,8 +11,8 @@ mod timed;
 
 use anyhow::{Context as _, Result};
 use domelight::render::{
-    Checkpoint, Counts, Layers, Observer, RenderSettings, Renderer, Rendering, Stage, TileView,
-    Tiling,
+    Checkpoint, Counts, Film, Layers, Observer, RenderSettings, Renderer, Rendering, Stage,
+    TileView, Tiling,
 };
 use domelight::strategy::Strategy;
 
@@ -377,7 +377,7 @@ impl RenderRun {
 
     /// Rejects more pixels than fit in memory.
     fn allow(&self, width: usize, height: usize) -> Result<()> {
-        let pixel = if self.save.is_some() { memory::SAVED_PIXEL } else { memory::PIXEL };
+        let pixel = if self.save.is_some() { memory::SAVED_PIXEL } else { Film::MEMORY_PER_PIXEL };
         memory::allow_picture(width, height, pixel)
     }
 

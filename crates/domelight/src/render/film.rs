@@ -41,6 +41,9 @@ pub enum FilmMismatch {
 }
 
 impl Film {
+    /// The memory of a pixel during a render \[bytes\]: its sums, and the layers that are computed from them.
+    pub const MEMORY_PER_PIXEL: u64 = 332;
+
     /// Creates a film without samples.
     pub fn new(width: usize, height: usize, window: Window) -> Self {
         Self { width, height, window, pixels: vec![PixelSums::default(); window.area()] }
