@@ -86,10 +86,7 @@ impl Texels {
 }
 
 fn size(mapping: Mapping, width: usize) -> (usize, usize) {
-    match mapping {
-        Mapping::LatLong => (width, width / 2),
-        _ => mapping.size_for(width / 2),
-    }
+    mapping.size_of([width, width / 2])
 }
 
 fn mapping_of(name: &str) -> Result<Mapping, JsError> {

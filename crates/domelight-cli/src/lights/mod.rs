@@ -10,7 +10,7 @@ use std::io::{self, IsTerminal as _};
 use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use domelight::environment::mapping::{Mapping, from_lat_long};
+use domelight::environment::mapping::from_lat_long;
 use domelight::environment::{Environment, Orientation};
 use domelight::picture::exposure::Exposure;
 use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
@@ -302,10 +302,7 @@ impl LightsArguments {
             let file = picture_path(path, picture)?;
             if !domes.written.contains(&file.path) {
                 let mapping = picture.mapping();
-                let size = match mapping {
-                    Mapping::LatLong => (map.width, map.height),
-                    _ => mapping.size_for(map.height),
-                };
+                let size = mapping.size_of([map.width, map.height]);
                 let converted = from_lat_long(map, mapping, size);
                 file.write(&converted, tone, PictureFormat::Exr, Some(mapping))?;
                 domes.written.push(file.path.clone());

@@ -167,11 +167,7 @@ fn convert(
     let map = turned.as_ref().unwrap_or(map);
     let tone = arguments.tone.of_picture(|| Exposure::Auto.stops(map, None));
     let mapping = arguments.to;
-    let size = match mapping {
-        Mapping::LatLong | Mapping::LatLongExr => (map.width, map.height),
-        _ => mapping.size_for(map.height),
-    };
-    let converted = from_lat_long(map, mapping, size);
+    let converted = from_lat_long(map, mapping, mapping.size_of([map.width, map.height]));
     output.write(&converted, tone, PictureFormat::Exr, Some(mapping))?;
     // Only OpenEXR states the mapping, and only of some.
     let envmap = match output.format().unwrap_or(PictureFormat::Exr) {

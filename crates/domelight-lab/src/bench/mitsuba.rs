@@ -274,7 +274,11 @@ fn bsdf(material: &MaterialSpec) -> Option<Value> {
         MaterialSpec::Mix => Some(json!({
             "type": "blendbsdf", "weight": 0.5, "a": diffuse(Rgb::splat(0.5)), "b": ggx(0.1),
         })),
-        _ => None,
+        MaterialSpec::Ggx { .. }
+        | MaterialSpec::Phong { .. }
+        | MaterialSpec::Ward { .. }
+        | MaterialSpec::Beckmann { .. }
+        | MaterialSpec::Gltf { .. } => None,
     }
 }
 

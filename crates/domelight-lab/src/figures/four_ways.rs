@@ -141,6 +141,7 @@ impl ShownStrategy {
                 format!("{n}/{}", n_candidates.unwrap_or(n))
             }
             StrategySpec::Product { n_rays } => n_rays.to_string(),
+            // The lecture has no others.
             _ => String::new(),
         };
         Ok(Self { title: format!("{name} {counts}"), spec, measured: figure_scene.measure(spec)? })
@@ -171,10 +172,9 @@ fn scaled_candidates(n: u32) -> u32 {
 /// Resampling with the ratio of candidates to rays that a pilot finds best here.
 fn tuned_sir(figure_scene: &FigureScene) -> impl Fn(u32) -> StrategySpec + use<> {
     const PILOT: u32 = 64;
-    let ratio = match figure_scene.complete(sir(PILOT, None)) {
-        StrategySpec::Sir { n_candidates: Some(m), .. } => m / PILOT,
-        _ => 1,
-    };
+    let found = figure_scene.complete(sir(PILOT, None));
+    let StrategySpec::Sir { n_candidates, .. } = found else { unreachable!("a pilot of SIR") };
+    let ratio = n_candidates.unwrap_or(PILOT) / PILOT;
     move |n| sir(n, Some(n * ratio.max(1)))
 }
 

@@ -246,7 +246,10 @@ mod tests {
                 let expected = match mapping {
                     Mapping::LatLongExr => Mapping::LatLong,
                     Mapping::MirrorBall => Mapping::Angular,
-                    mapping => mapping,
+                    Mapping::LatLong
+                    | Mapping::Angular
+                    | Mapping::Octahedral
+                    | Mapping::Cube(_) => mapping,
                 };
                 let (columns, rows) = mapping.aspect();
                 let image = from_lat_long(probe, mapping, (48 * columns, 48 * rows));

@@ -240,6 +240,16 @@ impl Mapping {
         (keeps.ceil() as usize).max(1)
     }
 
+    /// The size (width, height) of a picture in this mapping that keeps the detail of a lat-long map of a size.
+    pub fn size_of(self, [width, height]: [usize; 2]) -> (usize, usize) {
+        match self {
+            Self::LatLong | Self::LatLongExr => (width, height),
+            Self::Angular | Self::MirrorBall | Self::Octahedral | Self::Cube(_) => {
+                self.size_for(height)
+            }
+        }
+    }
+
     /// The size (width, height) of a picture in this mapping that keeps the detail of a lat-long map with
     /// `lat_long_height` rows: the inverse of [`Mapping::lat_long_height`].
     pub fn size_for(self, lat_long_height: usize) -> (usize, usize) {

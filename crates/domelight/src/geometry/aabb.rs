@@ -55,13 +55,4 @@ impl Aabb {
             Vec3::new(side(0), side(1), side(2))
         })
     }
-
-    /// Half the surface area; 0 for an empty box.
-    pub fn half_area(&self) -> f32 {
-        if self.is_empty() {
-            return 0.0;
-        }
-        let s = self.size();
-        s.x * s.y + s.y * s.z + s.z * s.x
-    }
 }

@@ -561,7 +561,11 @@ impl StrategySpec {
             Self::Brdf { .. } | Self::Mis { n_environment: 0, n_portal: 0, .. } => true,
             Self::Rejection { proposal, .. } => *proposal == Proposal::Brdf,
             Self::Sir { candidates, .. } => *candidates == Candidates::Brdf,
-            _ => false,
+            Self::Mis { .. }
+            | Self::Environment { .. }
+            | Self::Product { .. }
+            | Self::MedianCut { .. }
+            | Self::VarianceMinimization { .. } => false,
         }
     }
 

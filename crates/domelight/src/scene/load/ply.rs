@@ -463,7 +463,9 @@ impl Header {
                 let least = element.properties.iter().filter(|p| is_indices(p));
                 let least = match self.format {
                     Format::Ascii => 2,
-                    _ => least.map(|p| p.scalar.size()).min().unwrap_or(1),
+                    Format::Little | Format::Big => {
+                        least.map(|p| p.scalar.size()).min().unwrap_or(1)
+                    }
                 };
                 12 * (left / least) as u64
             }
@@ -481,7 +483,7 @@ impl Header {
                 .iter()
                 .map(|p| match self.format {
                     Format::Ascii => 2,
-                    _ => p.list.unwrap_or(p.scalar).size(),
+                    Format::Little | Format::Big => p.list.unwrap_or(p.scalar).size(),
                 })
                 .sum();
             // The last value of an ASCII file needs no separator.
