@@ -11,12 +11,13 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{array, from_image};
+use crate::camera::CameraLike;
 use crate::engine::{caught, wait};
 use crate::environment::Environment;
-use crate::error::{bad_value, from_source, warn};
+use crate::error::{bad_value, from_source, in_python, warn};
 use crate::options;
 use crate::render::{Arguments, Choice, RenderSetup, choose};
-use crate::scene::{CameraLike, Scene};
+use crate::scene::Scene;
 
 /// Ends the work on a signal or after a Python function has raised, and keeps the warnings.
 struct PythonHost<'a> {
@@ -43,8 +44,7 @@ impl WorkProgress for Progress<'_> {
 
 impl Host for PythonHost<'_> {
     fn warn(&self, text: &str) {
-        let text = text.replace("--reference-spp", "reference_spp");
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text);
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(in_python(text));
     }
 
     fn work_progress<'a>(&'a self) -> Option<Box<dyn WorkProgress + 'a>> {

@@ -2,26 +2,24 @@
 
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use domelight::environment::builtin::BuiltinProbe;
-use domelight::environment::io::{ProbeOptions, Window, load_probe};
-use domelight::environment::mapping::{CubeFaces, Mapping};
 use domelight::environment::{self, EnvironmentDensity, EnvironmentSample, Orientation, UpAxis};
 use domelight::rig::SphericalGaussians;
 use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings};
+use domelight::scene::{EnvironmentSettings, EnvironmentSource};
 use domelight::{Rgb, RgbImage};
+use domelight_lab::job::{Light, probe_name};
+use domelight_lab::{At as _, Error, Host};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyType};
+use pyo3::types::{PyBytes, PyDict, PyType};
 
 use crate::arrays::{Floats, array, from_image, hashable, image, rows};
 use crate::engine::{abandonable, alone, parallel, parallel_on};
-use crate::error::{bad_value, from_source, to_python, warn};
+use crate::error::{bad_value, from_source, in_python, to_python, warn};
+use crate::options;
 use crate::picture::{depth, to_png, tone};
-
-/// The maximum number of rows of a built-in map, from the library's limit for pictures.
-const MAX_ROWS: usize = 16_384;
 
 /// Parses the name of an axis.
 pub(crate) fn up_axis(text: &str) -> PyResult<UpAxis> {
@@ -68,16 +66,22 @@ pub(crate) struct Environment {
 }
 
 impl Environment {
-    pub(crate) fn build(
+    /// The light of a map that is loaded or built in; issues its warnings.
+    pub(crate) fn of(
         py: Python<'_>,
-        map: RgbImage,
-        orientation: Orientation,
-        scale: f32,
-        name: String,
+        light: Light,
+        settings: EnvironmentSettings,
     ) -> PyResult<Self> {
-        let inner =
-            abandonable(py, move || environment::Environment::new(map, orientation, scale))?;
-        Ok(Self { inner: Arc::new(inner.map_err(to_python)?), name })
+        let name = probe_name(&settings.source);
+        let made = abandonable(py, move || {
+            let kept = KeptWarnings::default();
+            let map = light.load(&settings, &kept)?;
+            let environment = settings.environment(map).at(probe_name(&settings.source))?;
+            Ok::<_, Error>((environment, kept.0.into_inner()))
+        });
+        let (environment, warnings) = made?.map_err(|e| from_source(&e))?;
+        warn(py, &warnings.unwrap_or_else(PoisonError::into_inner))?;
+        Ok(Self { inner: Arc::new(environment), name })
     }
 
     /// Converts radiance from the map's unit to watts.
@@ -94,28 +98,31 @@ fn watts(environment: &environment::Environment, radiance: Rgb) -> [f32; 3] {
     }
 }
 
-/// Loads a light probe's map from a file, and issues its warnings.
-pub(crate) fn load_map(py: Python<'_>, path: PathBuf, options: ProbeOptions) -> PyResult<RgbImage> {
-    let probe = abandonable(py, move || load_probe(&path, &options))?.map_err(to_python)?;
-    warn(py, &probe.warnings)?;
-    Ok(probe.image)
-}
+/// The options of maps from files.
+const OF_FILES: [&str; 10] = [
+    "rotate",
+    "scale",
+    "exposure",
+    "up",
+    "convention",
+    "mapping",
+    "faces",
+    "window",
+    "layer",
+    "strict",
+];
 
-/// The window of an OpenEXR file by its name.
-fn window(name: &str) -> PyResult<Window> {
-    Window::ALL
-        .into_iter()
-        .find(|window| window.name() == name)
-        .ok_or_else(|| bad_value(format!("window is {name:?}; it must be 'data' or 'display'")))
-}
+/// The options of built-in maps.
+const OF_BUILTIN: [&str; 5] = ["rotate", "scale", "exposure", "up", "rows"];
 
-/// The map of a built-in probe.
-pub(crate) fn builtin_map(py: Python<'_>, name: &str, height: usize) -> PyResult<RgbImage> {
-    let probe: BuiltinProbe = name.parse().map_err(|e| from_source(&e))?;
-    if !(1..=MAX_ROWS).contains(&height) {
-        return Err(bad_value(format!("rows is {height}; it must be from 1 to {MAX_ROWS}")));
+/// Keeps the warnings.
+#[derive(Default)]
+struct KeptWarnings(Mutex<Vec<String>>);
+
+impl Host for KeptWarnings {
+    fn warn(&self, text: &str) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(in_python(text));
     }
-    abandonable(py, move || probe.image(height))
 }
 
 #[pymethods]
@@ -132,7 +139,8 @@ impl Environment {
         let py = map.py();
         let orientation = Orientation { up: up_axis(up)?, rotation };
         let map = image(&Floats::new("map", map)?)?;
-        Self::build(py, map, orientation, scale, name.to_owned())
+        let made = abandonable(py, move || environment::Environment::new(map, orientation, scale))?;
+        Ok(Self { inner: Arc::new(made.map_err(to_python)?), name: name.to_owned() })
     }
 
     /// Load a light probe of any known format and layout.
@@ -143,6 +151,10 @@ impl Environment {
     ///     A picture: .hdr, .exr, .pfm, .png or .jpg.
     /// rotation, scale, up
     ///     As in the class.
+    /// exposure : float, default 0
+    ///     A further factor on the radiance, in stops.
+    /// convention : str, optional
+    ///     The program that the scene comes from, such as 'blender'; the map is oriented as in that program.
     /// mapping : str, optional
     ///     The layout, such as 'lat-long', 'angular' or 'cross-vertical'; guessed by default.
     /// faces : str, optional
@@ -171,32 +183,17 @@ impl Environment {
     /// DomelightWarning
     ///     If texels were repaired, or the format cannot store values above white.
     #[classmethod]
-    #[pyo3(signature = (path, *, rotation = 0.0, scale = 1.0, up = "y", mapping = None, faces = None, window = None,
-        layer = None, strict = false))]
+    #[pyo3(signature = (path, **options),
+        text_signature = "(path, *, rotation=0.0, scale=1.0, exposure=0.0, up='y', convention=None, mapping=None, faces=None, window=None, layer=None, strict=False)")]
     fn load(
         cls: &Bound<'_, PyType>,
         path: PathBuf,
-        rotation: f32,
-        scale: f32,
-        up: &str,
-        mapping: Option<&str>,
-        faces: Option<&str>,
-        window: Option<&str>,
-        layer: Option<String>,
-        strict: bool,
+        options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let py = cls.py();
-        let orientation = Orientation { up: up_axis(up)?, rotation };
-        let mapping: Option<Mapping> =
-            mapping.map(|m| m.parse().map_err(|e| from_source(&e))).transpose()?;
-        let faces: Option<CubeFaces> =
-            faces.map(|f| f.parse().map_err(|e| from_source(&e))).transpose()?;
-        let window = window.map(self::window).transpose()?;
-        let name = path.display().to_string();
-        let options =
-            ProbeOptions { mapping, faces, window, layer, strict, ..ProbeOptions::default() };
-        let map = load_map(py, path, options)?;
-        Self::build(py, map, orientation, scale, name)
+        let light = options::light(options, &OF_FILES)?;
+        let map = EnvironmentSettings::new(EnvironmentSource::File(path), UpAxis::default());
+        let settings = light.over_settings(map);
+        Self::of(cls.py(), light, settings)
     }
 
     /// Create a built-in probe: 'sky', 'studio', 'cathedral' or 'constant'.
@@ -207,22 +204,20 @@ impl Environment {
     ///     The name of the probe.
     /// rows : int, default 1024
     ///     Rows of the map, which has twice as many columns.
-    /// rotation, scale, up
-    ///     As in the class.
+    /// rotation, scale, exposure, up
+    ///     As in `load`.
     #[classmethod]
-    #[pyo3(signature = (name, *, rows = 1024, rotation = 0.0, scale = 1.0, up = "y"))]
+    #[pyo3(signature = (name, **options),
+        text_signature = "(name, *, rows=1024, rotation=0.0, scale=1.0, exposure=0.0, up='y')")]
     fn builtin(
         cls: &Bound<'_, PyType>,
-        name: &str,
-        rows: usize,
-        rotation: f32,
-        scale: f32,
-        up: &str,
+        name: String,
+        options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let py = cls.py();
-        let orientation = Orientation { up: up_axis(up)?, rotation };
-        let map = builtin_map(py, name, rows)?;
-        Self::build(py, map, orientation, scale, name.to_owned())
+        let light = options::light(options, &OF_BUILTIN)?;
+        let map = EnvironmentSettings::new(EnvironmentSource::Builtin(name), UpAxis::default());
+        let settings = light.over_settings(map);
+        Self::of(cls.py(), light, settings)
     }
 
     /// Convert a Mitsuba 3 emitter, or a picture in its layout.

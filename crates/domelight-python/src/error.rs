@@ -31,7 +31,7 @@ pub(crate) fn to_python(error: impl Into<domelight::Error>) -> PyErr {
 
 /// Like [`to_python`], for any error.
 pub(crate) fn from_source(error: &(dyn StdError + 'static)) -> PyErr {
-    let text = error.to_string();
+    let text = in_python(&error.to_string());
     let mut source = Some(error);
     while let Some(error) = source {
         let of_picture = match error.downcast_ref() {
@@ -48,6 +48,24 @@ pub(crate) fn from_source(error: &(dyn StdError + 'static)) -> PyErr {
         source = error.source();
     }
     PyValueError::new_err(text)
+}
+
+/// A message of the laboratory with options as keywords: `spp` for `--spp`, `scale` for `--env-scale`.
+pub(crate) fn in_python(text: &str) -> String {
+    let mut parts = text.split(" --");
+    let mut spelled = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let end = part.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(part.len());
+        let (option, rest) = part.split_at(end);
+        // Another character belongs to the name of a file.
+        if rest.is_empty() || rest.starts_with([' ', ',', ';', ':', ')']) {
+            spelled += &format!(" {}", option.trim_start_matches("env-").replace('-', "_"));
+        } else {
+            spelled += &format!(" --{option}");
+        }
+        spelled += rest;
+    }
+    spelled
 }
 
 /// A `ValueError`.

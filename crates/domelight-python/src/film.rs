@@ -280,7 +280,9 @@ impl Film {
         let color = denoised.as_ref().unwrap_or(&self.layers().color);
         let written = parallel(py, || match format {
             Format::Exr => self.write_exr(&path, denoised.as_ref()),
-            _ => write_image(&path, format, color, self.alpha_to_show(), &tone, depth),
+            Format::Hdr | Format::Pfm | Format::Png => {
+                write_image(&path, format, color, self.alpha_to_show(), &tone, depth)
+            }
         })?;
         written.map_err(to_python)
     }

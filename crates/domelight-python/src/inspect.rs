@@ -11,12 +11,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{array, rows};
+use crate::camera::CameraLike;
 use crate::engine::abandonable_on;
 use crate::environment::Environment;
 use crate::error::{bad_value, from_source, to_python};
 use crate::options;
 use crate::render::{Arguments, Choice, RenderSetup, choose};
-use crate::scene::{CameraLike, Scene};
+use crate::scene::Scene;
 
 /// The result at a pixel.
 struct Found {

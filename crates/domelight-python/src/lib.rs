@@ -5,6 +5,7 @@
 
 mod arrays;
 mod bsdf;
+mod camera;
 mod compare;
 mod engine;
 mod environment;
@@ -45,7 +46,7 @@ mod _domelight {
         progressive::{Progressive, progressive},
         render::{render, strategy_names},
         rig::{Rig, lights},
-        scene::{Camera, Scene},
+        scene::Scene,
         strategy::ShadingPoints,
         testing::{chi2, z_test},
     };

@@ -11,12 +11,13 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::camera::CameraLike;
 use crate::engine::{caught, wait};
 use crate::environment::Environment;
 use crate::film::Film;
 use crate::options;
 use crate::render::{Arguments, RenderSetup, Visitor, Watch, interrupted, warn_of};
-use crate::scene::{CameraLike, Scene};
+use crate::scene::Scene;
 
 /// The film after a pass; `None` if nothing was left to render.
 type Step = PyResult<Option<Film>>;

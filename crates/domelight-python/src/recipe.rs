@@ -39,12 +39,16 @@ impl Recipe {
     }
 }
 
-/// The keywords that were given.
+/// The keywords that were given: options, and others.
 pub(crate) fn keywords<'py>(
     py: Python<'py>,
+    options: Option<&Bound<'py, PyDict>>,
     given: impl IntoIterator<Item = (&'static str, Option<Bound<'py, PyAny>>)>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let keywords = PyDict::new(py);
+    let keywords = match options {
+        Some(options) => options.copy()?,
+        None => PyDict::new(py),
+    };
     for (name, value) in given {
         if let Some(value) = value {
             keywords.set_item(name, value)?;

@@ -10,10 +10,10 @@ use domelight::render::{
     Background, Counts, Observer, Passes, Provenance, RenderSettings, Renderer, automatic_exposure,
 };
 use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
-use domelight::strategy::{PreparedStrategy, Strategy, StrategyKind, StrategySpec};
-use domelight_lab::Ground;
-use domelight_lab::job::Job;
+use domelight::strategy::{PreparedStrategy, Strategy, StrategyError, StrategyKind, StrategySpec};
+use domelight_lab::job::{Job, Light};
 use domelight_lab::names::file_name;
+use domelight_lab::refuse_repeating_points;
 use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
 use domelight_lab::scene::PreparedSceneRef;
 use pyo3::exceptions::PyMemoryError;
@@ -22,18 +22,16 @@ use pyo3::types::PyDict;
 use rayon::ThreadPool;
 
 use crate::bsdf::MaterialLike;
+use crate::camera::CameraLike;
 use crate::engine::{caught, n_threads, pool, wait};
 use crate::environment::Environment;
-use crate::error::{RenderInterrupted, bad_value, to_python, warn};
+use crate::error::{RenderInterrupted, bad_value, from_source, to_python, warn};
 use crate::failure::Failure;
 use crate::film::{Film, Making, automatic_exposure_of};
 use crate::lobe::PythonLobe;
 use crate::options;
-use crate::scene::{CameraLike, Scene, SceneData};
+use crate::scene::{Scene, SceneData};
 use crate::strategy::PythonStrategy;
-
-/// Memory per pixel of a render [bytes]: its sums and its layers.
-const PIXEL_BYTES: usize = 308;
 
 /// The strategy: built-in or a Python function.
 pub(crate) enum Choice {
@@ -94,7 +92,7 @@ impl RenderSetup {
         let (environment, probe) = if let Some(environment) = environment {
             (environment.get().inner.clone(), environment.get().name.clone())
         } else {
-            let of_scene = scene.environment(py, BUILTIN_ROWS)?;
+            let of_scene = scene.lit_by(py, Light::default())?;
             (of_scene.inner, of_scene.name)
         };
         let up = environment.orientation().up.vector();
@@ -209,8 +207,8 @@ impl RenderSetup {
             triangles: scene.scene.triangle_count(),
             warnings: Vec::new(),
             material: changes.material.as_ref().and_then(MaterialLike::text),
-            normalize: changes.normalize,
-            ground: changes.ground.then_some(Ground::Plate),
+            normalize: changes.subject.normalize,
+            ground: changes.subject.ground.map(|ground| ground.0),
             hide_env: settings.background == Background::Hidden,
             environment: EnvironmentReport::new(probe.clone(), &light, environment),
             camera: CameraReport::new(camera_settings, scene.offset, None),
@@ -262,8 +260,8 @@ impl RenderSetup {
     }
 }
 
-/// The rows of a built-in probe named by a scene, as in the program.
-const BUILTIN_ROWS: usize = 1024;
+/// The candidates of SIR for each ray if BSDFs are written in Python and no number is given.
+const CANDIDATES_PER_RAY: u32 = 16;
 
 /// The strategy from Python, by name or as a function.
 pub(crate) fn choose(
@@ -280,37 +278,23 @@ pub(crate) fn choose(
         }
         return Ok(Choice::Python(PythonStrategy::new(strategy.clone(), lobes.to_vec())?));
     };
-    let spec: StrategySpec =
-        text.parse().map_err(|e: domelight::strategy::StrategyError| to_python(e))?;
-    let spec = if lobes.is_empty() { spec } else { without_pilot(spec) };
-    let n_points = spec.points_per_sample();
-    if u64::from(spp) * u64::from(n_points) > 1 << 32 {
-        return Err(bad_value(format!(
-            "spp is {spp}: so many camera samples of {n_points} directions are more points than a pixel has (2^32)"
-        )));
+    let mut spec: StrategySpec = text.parse().map_err(|e: StrategyError| to_python(e))?;
+    // A pilot would call Python's BSDFs direction by direction, for a minute, before the render can be interrupted.
+    if let (StrategySpec::Sir { n_candidates, n_samples, .. }, [_, ..]) = (&mut spec, lobes) {
+        n_candidates.get_or_insert(*n_samples * CANDIDATES_PER_RAY);
     }
+    refuse_repeating_points(spec, spp).map_err(|e| from_source(&e))?;
     if spec.kind() == StrategyKind::Rejection && lobes.iter().any(|lobe| !lobe.has_bound()) {
         return Err(bad_value("rejection needs the max_eval of a BSDF of one's own"));
     }
     Ok(Choice::Builtin(spec))
 }
 
-/// Sets the number of SIR candidates if it was left open. A pilot would call Python's BSDFs direction by direction, for a
-/// minute, before the render can be interrupted.
-fn without_pilot(spec: StrategySpec) -> StrategySpec {
-    const CANDIDATES_PER_RAY: u32 = 16;
-    match spec {
-        StrategySpec::Sir { n_candidates: None, n_samples, candidates, resampling } => {
-            let n_candidates = Some(n_samples * CANDIDATES_PER_RAY);
-            StrategySpec::Sir { n_candidates, n_samples, candidates, resampling }
-        }
-        other => other,
-    }
-}
-
 /// Rejects a picture that does not fit into memory, before the allocator ends the process.
 fn require_memory(width: usize, height: usize) -> PyResult<()> {
-    let bytes = width.saturating_mul(height).saturating_mul(PIXEL_BYTES);
+    let bytes = width
+        .saturating_mul(height)
+        .saturating_mul(domelight::render::Film::MEMORY_PER_PIXEL as usize);
     Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| {
         let text = format!("size is ({width}, {height}): {bytes} bytes of memory are not there");
         PyMemoryError::new_err(text)

@@ -86,7 +86,7 @@ impl Rig {
         let map = residual.radiance_map();
         let mapping = picture.mapping();
         let converted: Option<RgbImage> = (mapping != Mapping::LatLong)
-            .then(|| from_lat_long(&map, mapping, mapping.size_for(map.height)));
+            .then(|| from_lat_long(&map, mapping, mapping.size_of([map.width, map.height])));
         let tone = ToneMapping::default();
         let map = converted.as_ref().unwrap_or(&map);
         write_image(&path.with_file_name(&name), format, map, None, &tone, Depth::default())?;

@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import pickle
 import re
 from typing import get_args, get_type_hints
 
@@ -166,7 +167,7 @@ def test_the_line_of_a_scene_file_that_names_a_missing_map_is_named(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text('[environment]\nfile = "none.hdr"\n\n[[objects]]\nbuiltin = "sphere"\n')
     scene = dl.Scene.load(path)
-    with pytest.raises(FileNotFoundError, match=r"scene\.toml.*line 1, \[environment\].*none\.hdr"):
+    with pytest.raises(FileNotFoundError, match=r"none\.hdr, which .*scene\.toml, line 1, \[environment\]"):
         scene.environment()
 
 
@@ -240,6 +241,58 @@ def test_options_of_jobs_are_keywords():
     assert np.array_equal(film.color, same.color) and film.color.shape == (4, 4, 3)
 
 
+def test_options_of_scenes_are_those_of_jobs():
+    defaults = {option["name"]: option["default"] for option in json.loads(_domelight.job_options())}
+    changes = {"ground", "normalize", "portal"}
+    for constructor, options in [
+        (dl.Scene, changes),
+        (dl.Scene.builtin, changes),
+        (dl.Scene.load, {*changes, "scene", "animation", "at", "strict"}),
+    ]:
+        parameters = inspect.signature(constructor).parameters
+        assert options <= parameters.keys()
+        assert all((parameters[name].default or None) == (defaults[name] or None) for name in options)
+    for wrong, words in [({"ground": "hole"}, "not one of plate, shadow"), ({"portal": "1,2"}, "is no portal")]:
+        with pytest.raises(ValueError, match=words):
+            dl.Scene.builtin("sphere", **wrong)
+    for wrong in ({"spp": 3}, {"at": 1.0}, {"velvet": 1}):
+        with pytest.raises(TypeError, match="scenes have no argument"):
+            dl.Scene.builtin("sphere", **wrong)
+    shadow = dl.Scene.builtin("sphere", ground="shadow")
+    assert pickle.loads(pickle.dumps(shadow)) == shadow != dl.Scene.builtin("sphere", ground=True)
+    assert dl.Scene.builtin("sphere", ground=False) == SPHERE
+
+
+def test_options_of_environments_are_those_of_jobs(tmp_path):
+    fields = {option["field"]: option for option in json.loads(_domelight.job_options())}
+    path = tmp_path / "map.exr"
+    dl.write(path, ENV.map)
+    for constructor, name, extra in [
+        (dl.Environment.builtin, "sky", {"rows"}),
+        (dl.Environment.load, path, {"convention", "mapping", "faces", "window", "layer", "strict"}),
+    ]:
+        parameters = set(inspect.signature(constructor).parameters) - {"name", "path"}
+        assert parameters == {"rotation", "scale", "exposure", "up", *extra}
+        assert all(f"light.{parameter.replace('rotation', 'rotate')}" in fields for parameter in parameters)
+        for wrong, words in [
+            ({"rotation": "auto"}, "rotation is auto"),
+            ({"scale": -1}, "scale: '-1'"),
+            ({"up": "x"}, "up: 'x'"),
+            ({"exposure": np.inf}, "exposure: 'inf'"),
+        ]:
+            with pytest.raises(ValueError, match=words):
+                constructor(name, **wrong)
+        for wrong in ({"spp": 3}, {"env_scale": 1.0}, {"rotate": 3.0}):
+            with pytest.raises(TypeError, match="environments have no argument"):
+                constructor(name, **wrong)
+        plain, changed = constructor(name), constructor(name, rotation=30, scale=0.5, exposure=1, up="z")
+        assert (changed.rotation, changed.up) == (30, "z") and np.allclose(changed.map, plain.map)
+    with pytest.raises(ValueError, match="rows: '0'"):
+        dl.Environment.builtin("sky", rows=0)
+    turned = dl.Environment.load(path, convention="mitsuba")
+    assert (turned.rotation - ENV.rotation) % 360 == 180
+
+
 def test_the_names_for_type_checkers_are_those_of_the_engine():
     tiny = {"spp": 1, "size": (2, 2)}
     picture = np.ones((2, 2, 3))
@@ -250,6 +303,7 @@ def test_the_names_for_type_checkers_are_those_of_the_engine():
         (_names.Curve, lambda name: dl.tone_map(picture, curve=name)),
         (_names.Layer, lambda name: FILM[name]),
         (_names.Up, lambda name: dl.Environment(ENV.map, up=name)),
+        (_names.Ground, lambda name: dl.Scene.builtin("sphere", ground=name)),
     ]:
         known = get_args(names)
         for name in known:

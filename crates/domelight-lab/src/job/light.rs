@@ -74,7 +74,7 @@ impl Default for Light {
 }
 
 /// The name of the probe, for messages.
-pub(crate) fn probe_name(source: &EnvironmentSource) -> String {
+pub fn probe_name(source: &EnvironmentSource) -> String {
     match source {
         EnvironmentSource::File(path) => path.display().to_string(),
         EnvironmentSource::Builtin(name) => name.clone(),
@@ -89,12 +89,16 @@ impl Light {
             Err(_) => EnvironmentSource::File(name.into()),
         };
         let plain = |source| EnvironmentSettings::new(source, scene.up.unwrap_or_default());
-        let mut settings = match (&self.map, &scene.environment) {
+        self.over_settings(match (&self.map, &scene.environment) {
             // Another probe does not inherit the first one's adjustments.
             (Some(name), _) => plain(source(name)),
             (None, Some(of_scene)) => of_scene.clone(),
             (None, None) => plain(source(BuiltinProbe::Sky.name())),
-        };
+        })
+    }
+
+    /// The settings of a map, overridden by these.
+    pub fn over_settings(&self, mut settings: EnvironmentSettings) -> EnvironmentSettings {
         let rotate = self.rotate.and_then(|Text(rotate)| rotate.degrees());
         let turn = self.convention.map_or(0.0, |Choice(convention)| convention.rotation());
         settings.rotate_degrees = rotate.unwrap_or(settings.rotate_degrees) + turn;

@@ -127,7 +127,7 @@ impl PortalList {
 
 impl Subject {
     /// Applies the changes to the scene.
-    pub(crate) fn apply(&self, scene: &mut SceneDescription, up: Vec3) {
+    pub fn apply(&self, scene: &mut SceneDescription, up: Vec3) {
         if let Some(Text(portals)) = &self.portal {
             scene.portals.extend(portals.relative_to(scene.offset));
         }

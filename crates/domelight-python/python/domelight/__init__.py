@@ -24,7 +24,6 @@ parts of a picture or map give a `DomelightWarning`.
 from . import metrics, strategies, testing
 from ._domelight import (
     Bsdf,
-    Camera,
     Density,
     DomelightWarning,
     Environment,
@@ -45,6 +44,7 @@ from ._domelight import (
     tone_map,
     write,
 )
+from ._camera import Camera
 from ._compare import Comparison, compare
 from ._inspect import Inspection, inspect
 from ._render import progressive, render

@@ -19,7 +19,8 @@ from ._progress import bar, callback
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from ._domelight import Camera, Environment, Scene
+    from ._camera import Camera
+    from ._domelight import Environment, Scene
     from ._options import PictureOptions
     from .strategies import Strategy
 

@@ -7,7 +7,8 @@ from typing import Any, SupportsIndex, TypeAlias, final
 import numpy as np
 import numpy.typing as npt
 
-from ._names import Content, Curve, Engine, Layer, ShaderLanguage, Texels, Up, Window
+from ._camera import Camera
+from ._names import Content, Curve, Engine, Ground, Layer, ShaderLanguage, Texels, Up, Window
 from ._options import PictureOptions, RenderOptions
 from .metrics import Comparison
 from .strategies import Strategy
@@ -46,7 +47,9 @@ class Environment:
         *,
         rotation: float = 0.0,
         scale: float = 1.0,
+        exposure: float = 0.0,
         up: Up = "y",
+        convention: str | None = None,
         mapping: str | None = None,
         faces: str | None = None,
         window: Window | None = None,
@@ -61,6 +64,7 @@ class Environment:
         rows: int = 1024,
         rotation: float = 0.0,
         scale: float = 1.0,
+        exposure: float = 0.0,
         up: Up = "y",
     ) -> Environment: ...
     @classmethod
@@ -131,40 +135,6 @@ class Material:
     def bsdf(self) -> Bsdf: ...
 
 @final
-class Camera:
-    def __new__(
-        cls,
-        *,
-        origin: npt.ArrayLike | None = None,
-        target: npt.ArrayLike | None = None,
-        up: npt.ArrayLike | None = None,
-        fov: float | None = None,
-        ortho: float | None = None,
-        shift: tuple[float, float] = (0.0, 0.0),
-        aperture: float | None = None,
-        focus_distance: float | None = None,
-        blades: int = 0,
-    ) -> Camera: ...
-    @property
-    def origin(self) -> _Floats | None: ...
-    @property
-    def target(self) -> _Floats | None: ...
-    @property
-    def up(self) -> _Floats | None: ...
-    @property
-    def fov(self) -> float | None: ...
-    @property
-    def ortho(self) -> float | None: ...
-    @property
-    def shift(self) -> tuple[float, float]: ...
-    @property
-    def aperture(self) -> float | None: ...
-    @property
-    def focus_distance(self) -> float | None: ...
-    @property
-    def blades(self) -> int: ...
-
-@final
 class Scene:
     def __new__(
         cls,
@@ -175,8 +145,9 @@ class Scene:
         colors: npt.ArrayLike | None = None,
         uvs: npt.ArrayLike | None = None,
         material: _MaterialLike | None = None,
-        ground: bool = False,
+        ground: bool | Ground = False,
         normalize: bool = False,
+        portal: str | None = None,
         up: Up = "y",
         name: str = "mesh",
     ) -> Scene: ...
@@ -186,8 +157,9 @@ class Scene:
         path: _Path,
         *,
         material: _MaterialLike | None = None,
-        ground: bool = False,
+        ground: bool | Ground = False,
         normalize: bool = False,
+        portal: str | None = None,
         scene: str | None = None,
         animation: str | None = None,
         at: float = 0.0,
@@ -200,8 +172,9 @@ class Scene:
         name: str,
         *,
         material: _MaterialLike | None = None,
-        ground: bool = False,
+        ground: bool | Ground = False,
         normalize: bool = False,
+        portal: str | None = None,
     ) -> Scene: ...
     @property
     def name(self) -> str: ...

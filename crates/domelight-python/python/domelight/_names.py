@@ -9,6 +9,7 @@ Curve: TypeAlias = Literal["standard", "reinhard", "aces", "agx", "neutral"]
 Layer: TypeAlias = Literal[
     "color", "alpha", "unoccluded", "shadow", "albedo", "normal", "depth", "variance", "samples", "hits"
 ]
+Ground: TypeAlias = Literal["plate", "shadow"]
 Up: TypeAlias = Literal["y", "z"]
 Window: TypeAlias = Literal["data", "display"]
 ShaderLanguage: TypeAlias = Literal["wgsl", "glsl", "hlsl", "slang", "cuda", "metal"]

@@ -12,7 +12,8 @@ from ._progress import bar, callback
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from ._domelight import Camera, Environment, Film, Progressive, Scene
+    from ._camera import Camera
+    from ._domelight import Environment, Film, Progressive, Scene
     from ._options import RenderOptions
     from .strategies import Strategy
 
