@@ -27,6 +27,7 @@ mod map_picture;
 mod memory;
 mod merge;
 mod output;
+mod page;
 mod parse;
 mod preview;
 mod probe;
@@ -66,6 +67,7 @@ fn main() -> ExitCode {
         Command::Ibl(arguments) => ibl::run(&arguments, quiet),
         Command::Tables(arguments) => tables::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
+        Command::Page(arguments) => page::run(&arguments, quiet),
         Command::Conventions(arguments) => conventions::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Schema => output::print_json(&domelight_lab::job::schema()),

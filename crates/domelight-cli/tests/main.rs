@@ -16,6 +16,7 @@ mod json;
 mod lights;
 mod limits;
 mod names;
+mod page;
 mod render;
 mod rig_formats;
 mod tables;

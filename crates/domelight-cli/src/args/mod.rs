@@ -7,6 +7,7 @@ pub(crate) mod figures;
 pub(crate) mod ibl;
 pub(crate) mod inspect;
 pub(crate) mod lights;
+pub(crate) mod page;
 pub(crate) mod render;
 pub(crate) mod render_run;
 pub(crate) mod tables;
@@ -132,6 +133,9 @@ pub(crate) enum Command {
     /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
     #[command(after_help = figures::EXAMPLES)]
     Figures(Box<figures::FiguresArguments>),
+    /// Write the browser edition, all of domelight in one page that needs no server.
+    #[command(after_help = page::EXAMPLES)]
+    Page(page::PageArguments),
     /// List how other programs orient a lat-long map, or write a map that shows it.
     #[command(after_help = CONVENTIONS_EXAMPLES)]
     Conventions(ConventionsArguments),
