@@ -148,6 +148,28 @@ pub fn probe_from_bytes(
     probe_from_picture(picture::read_bytes(bytes, file, &read)?, file, options)
 }
 
+/// Loads the lat-long map in the bytes of a Radiance or OpenEXR file with each `factor` × `factor` texels averaged over their
+/// solid angles ([`picture::read_reduced`]), which needs the memory of the smaller map alone; `file` is its name, for
+/// messages.
+///
+/// # Errors
+/// Those of [`probe_from_bytes`] and [`picture::read_reduced`].
+pub fn reduced_probe_from_bytes(
+    bytes: &[u8],
+    file: &str,
+    factor: usize,
+    options: &ProbeOptions,
+) -> Result<LoadedProbe, ProbeError> {
+    let read = ReadOptions { layer: options.layer.clone(), max_memory: options.max_memory };
+    let mut picture = picture::read_reduced(bytes, file, factor, &read)?;
+    let RgbImage { width, height, .. } = picture.image;
+    let [columns, rows] = [width, height].map(|n| n * factor);
+    picture.warnings.push(format!(
+        "its {columns}x{rows} texels are averaged to {width}x{height}, with the same light"
+    ));
+    probe_from_picture(picture, file, options)
+}
+
 /// Converts a picture to a light probe; `file` is for messages.
 ///
 /// # Errors

@@ -51,6 +51,21 @@ pub enum PictureErrorKind {
         /// Rows.
         height: usize,
     },
+    /// A picture that cannot be read at a fraction of its size.
+    #[error(
+        "the picture is {width}x{height}: only lat-long maps twice as wide as high, whose size {factor} divides, can be reduced by it"
+    )]
+    NotReducible {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// The factor.
+        factor: usize,
+    },
+    /// A format that cannot be read in parts.
+    #[error("only .hdr and .exr files can be reduced while they are read")]
+    OnlyWhole,
     /// More texels than are ever read, or than there is memory for.
     #[error(
         "the picture is {width}x{height}: larger than can be read ({} texels at most, memory permitting)",

@@ -16,6 +16,7 @@
 //! crate's decoder supports only one orientation and drops EXPOSURE.
 
 use super::primaries::{Primaries, to_light, xyz_of_white_to_rec709, xyz_to_rec709};
+use super::reduced::Reduction;
 use super::{Format, Picture, PictureErrorKind, allocate, checked_area};
 use crate::environment::mapping::Fisheye;
 use crate::math::functions;
@@ -56,6 +57,41 @@ pub fn decode(bytes: &[u8]) -> Result<Picture, PictureErrorKind> {
     let picture = Picture::opaque(header.upright(pixels), Format::Hdr);
     let (notes, fisheye) = (header.notes(), header.fisheye);
     Ok(Picture { notes, fisheye, warnings: header.warnings, ..picture })
+}
+
+/// Decodes a whole file, with blocks of texels averaged.
+pub(super) fn decode_reduced(bytes: &[u8], factor: usize) -> Result<Picture, PictureErrorKind> {
+    let header = Header::parse(bytes)?;
+    let reduction = Reduction::new(header.size(), factor)?;
+    if !header.is_direct() {
+        return Err(PictureErrorKind::OnlyWhole);
+    }
+    let starts = scanline_starts(bytes, &header)?;
+    let color = ColorTable::new(&header);
+    let mut pixels = allocate(Rgb::BLACK, reduction.width, reduction.height)?;
+    pixels.par_chunks_exact_mut(reduction.width).enumerate().for_each_init(
+        || vec![[0u8; 4]; header.length],
+        |rgbe, (y, row)| {
+            for line in y * factor..(y + 1) * factor {
+                decode_scanline(&bytes[starts[line]..], rgbe);
+                for (pixel, block) in row.iter_mut().zip(rgbe.chunks_exact(factor)) {
+                    let colors = block.iter().map(|&rgbe| color.decode(rgbe));
+                    colors.for_each(|color| *pixel += reduction.weights[line] * color);
+                }
+            }
+        },
+    );
+    let image = RgbImage::new(reduction.width, reduction.height, pixels);
+    let (notes, fisheye) = (header.notes(), header.fisheye);
+    let picture = Picture::opaque(image, Format::Hdr);
+    Ok(Picture { notes, fisheye, warnings: header.warnings, ..picture })
+}
+
+/// The width and height that the header promises.
+pub(super) fn size(bytes: &[u8]) -> Result<(usize, usize), PictureErrorKind> {
+    let header = Header::parse(bytes)?;
+    checked_area(header.length, header.lines)?;
+    Ok(header.size())
 }
 
 /// How many texels the header promises.
@@ -229,11 +265,15 @@ impl Header {
         if self.fast.is_x { (self.length, self.lines) } else { (self.lines, self.length) }
     }
 
+    /// Whether the file has the top row first, left to right.
+    fn is_direct(&self) -> bool {
+        self.fast.is_x && self.slow.forward && self.fast.forward
+    }
+
     /// Top row first, left to right, from the file's order.
     fn upright(&self, pixels: Vec<Rgb>) -> RgbImage {
         let (width, height) = self.size();
-        let direct = self.fast.is_x && self.slow.forward && self.fast.forward;
-        if direct {
+        if self.is_direct() {
             return RgbImage::new(width, height, pixels);
         }
         let along = |axis: Axis, i: usize| if axis.forward { i } else { axis.size - 1 - i };

@@ -20,12 +20,14 @@ pub mod pfm;
 #[cfg(feature = "io")]
 pub mod png;
 mod primaries;
+mod reduced;
 pub mod texture;
 pub mod tone;
 
 #[cfg(feature = "io")]
 pub use crate::files::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
 pub use error::{PictureError, PictureErrorKind};
+pub use reduced::{read_reduced, reduced_size};
 
 use crate::environment::mapping::{EnvmapKind, Fisheye};
 use crate::memory;

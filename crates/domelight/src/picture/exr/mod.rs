@@ -9,4 +9,5 @@ mod write;
 
 pub use read::decode;
 pub(crate) use read::texels;
+pub(super) use read::{decode_reduced, size};
 pub use write::{Compression, ExrLayers, Layer, Plane, plain_attributes, text_attributes};

@@ -13,6 +13,7 @@ use super::attributes::{envmap, primaries, to_rec709, window};
 use super::luminance_chroma::LuminanceChroma;
 use super::write::string_attributes;
 use crate::picture::primaries::{to_light, xyz_to_rec709};
+use crate::picture::reduced::Reduction;
 use crate::picture::{
     Format, GuessedLayer, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area,
 };
@@ -40,7 +41,16 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// # Errors
 /// If the file is damaged, incomplete or deep, or has no such layer.
 pub fn decode(bytes: &[u8], layer: Option<&str>) -> Result<Picture, PictureErrorKind> {
-    guarded(|| decode_unguarded(bytes, layer))
+    guarded(|| decode_unguarded(bytes, layer, 1))
+}
+
+/// Decodes one layer as [`decode`] does, with blocks of texels averaged and without alpha.
+pub(in crate::picture) fn decode_reduced(
+    bytes: &[u8],
+    layer: Option<&str>,
+    factor: usize,
+) -> Result<Picture, PictureErrorKind> {
+    guarded(|| decode_unguarded(bytes, layer, factor))
 }
 
 /// Turns the crate's panics into errors: it asserts in places where only a corrupt file can lead. Nothing of what
@@ -59,9 +69,13 @@ pub(super) fn guarded<T>(
 /// Blocks decompressed together: enough for all cores, few enough to need little memory.
 const BATCH: usize = 32;
 
-fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, PictureErrorKind> {
+fn decode_unguarded(
+    bytes: &[u8],
+    layer: Option<&str>,
+    factor: usize,
+) -> Result<Picture, PictureErrorKind> {
     if let Some(file) = LuminanceChroma::of(bytes).filter(|_| layer.is_none()) {
-        return file.decode(bytes);
+        return if factor == 1 { file.decode(bytes) } else { Err(PictureErrorKind::OnlyWhole) };
     }
     let reader = open(bytes)?;
     let selected = select(reader.headers(), layer)?;
@@ -86,18 +100,25 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
 
     // Memory for the picture is taken when its first blocks have turned out to be whole.
     let mut planes = None;
-    let channels = selected.channels;
+    let [r, g, b, alpha] = selected.channels;
+    let channels = [r, g, b, alpha.filter(|_| factor == 1)];
     let header = header.clone();
+    let window = window(&header);
+    if factor > 1 && window.is_some() {
+        return Err(PictureErrorKind::ExrUnsupported(
+            "reduced pictures whose data window is not the display window",
+        ));
+    }
+    let new = || Planes::new(&header, channels, factor);
     for_each_block(reader, selected.header, |block| {
         let planes = match &mut planes {
             Some(planes) => planes,
-            none => none.insert(Planes::new(&header, channels)?),
+            none => none.insert(new()?),
         };
         planes.insert(&header, block)
     })?;
-    let planes = planes.map_or_else(|| Planes::new(&header, channels), Ok)?;
+    let planes = planes.map_or_else(new, Ok)?;
     let image = planes.into_image(matrix);
-    let window = window(&header);
     let attributes = string_attributes(&header);
     Ok(Picture {
         alpha: image.1,
@@ -108,6 +129,15 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
         notes: notes.into_iter().collect(),
         warnings: warnings.into_iter().collect(),
         ..Picture::opaque(image.0, Format::Exr)
+    })
+}
+
+/// The width and height of the first part.
+pub(in crate::picture) fn size(bytes: &[u8]) -> Result<(usize, usize), PictureErrorKind> {
+    guarded(|| {
+        let reader = open(bytes)?;
+        let size = reader.headers().first().map(|header| header.layer_size);
+        size.map(|size| (size.0, size.1)).ok_or(PictureErrorKind::NoBytes)
     })
 }
 
@@ -149,8 +179,10 @@ pub(super) fn for_each_block(
     let meta = chunks.meta_data().clone();
     let (mut found, mut texels) = (HashSet::new(), 0);
     loop {
+        // A single thread needs no more than one block.
+        let most = BATCH.min(4 * rayon::current_num_threads());
         let batch: Vec<Chunk> =
-            chunks.by_ref().take(BATCH).collect::<Result<_, _>>().map_err(PictureErrorKind::Exr)?;
+            chunks.by_ref().take(most).collect::<Result<_, _>>().map_err(PictureErrorKind::Exr)?;
         if batch.is_empty() {
             break;
         }
@@ -441,14 +473,23 @@ struct Planes {
     pixels: Vec<Rgb>,
     alpha: Option<Vec<f32>>,
     channels: [Option<usize>; 4],
+    /// Of how the picture is smaller than the file.
+    reduction: Option<Reduction>,
 }
 
 impl Planes {
-    fn new(header: &Header, channels: [Option<usize>; 4]) -> Result<Self, PictureErrorKind> {
+    fn new(
+        header: &Header,
+        channels: [Option<usize>; 4],
+        factor: usize,
+    ) -> Result<Self, PictureErrorKind> {
         let (width, height) = (header.layer_size.0, header.layer_size.1);
-        let pixels = allocate(Rgb::BLACK, width, height)?;
+        let reduction =
+            (factor > 1).then(|| Reduction::new((width, height), factor)).transpose()?;
+        let size = reduction.as_ref().map_or((width, height), |r| (r.width, r.height));
+        let pixels = allocate(Rgb::BLACK, size.0, size.1)?;
         let alpha = channels[3].map(|_| allocate(0.0, width, height)).transpose()?;
-        Ok(Self { width, height, pixels, alpha, channels })
+        Ok(Self { width, height, pixels, alpha, channels, reduction })
     }
 
     fn insert(
@@ -469,8 +510,12 @@ impl Planes {
             let sample_type = header.channels.list[place.channel].sample_type;
             to_floats(line, sample_type, &mut halves, &mut values)
                 .map_err(PictureErrorKind::Exr)?;
-            let start = place.position.1 * self.width + place.position.0;
-            self.put(place.channel, start, &values);
+            let (x, y) = (place.position.0, place.position.1);
+            if self.reduction.is_some() {
+                self.add(place.channel, x, y, &values);
+            } else {
+                self.put(place.channel, y * self.width + x, &values);
+            }
         }
         Ok(())
     }
@@ -489,6 +534,19 @@ impl Planes {
         }
     }
 
+    /// Adds what the values of a row from (x, y) on contribute to a smaller picture.
+    fn add(&mut self, channel: usize, x: usize, y: usize, values: &[f32]) {
+        let Some(Reduction { factor, width, weights, .. }) = &self.reduction else { return };
+        let [r, g, b] = [0, 1, 2].map(|i| self.channels[i] == Some(channel));
+        let row = &mut self.pixels[y / factor * width..][..*width];
+        for (x, &value) in (x..).zip(values) {
+            let (pixel, part) = (&mut row[x / factor], weights[y] * value);
+            pixel.r += if r { part } else { 0.0 };
+            pixel.g += if g { part } else { 0.0 };
+            pixel.b += if b { part } else { 0.0 };
+        }
+    }
+
     fn into_image(self, matrix: Option<crate::math::Mat3>) -> (RgbImage, Option<Vec<f32>>) {
         let mut pixels = self.pixels;
         if let Some(matrix) = matrix {
@@ -496,7 +554,8 @@ impl Planes {
                 *pixel = to_light(&matrix, *pixel);
             }
         }
-        (RgbImage::new(self.width, self.height, pixels), self.alpha)
+        let size = self.reduction.map_or((self.width, self.height), |r| (r.width, r.height));
+        (RgbImage::new(size.0, size.1, pixels), self.alpha)
     }
 }
 
