@@ -10,6 +10,8 @@ export interface SceneReport {
   warnings: string[];
   camera: Camera;
   cameras: { name: string; camera: Camera }[];
+  /** The materials that it uses; `text` is empty where the notation has no such material. */
+  materials: { index: number; name: string; text: string }[];
   center: number[];
   radius: number;
   up: number[];
@@ -22,6 +24,16 @@ export interface ProbeReport {
 }
 
 type Contents = { path: string; bytes: Uint8Array }[];
+
+/** A configuration whose map is too large, and the sizes at which it fits, the largest first. */
+interface Offer {
+  state: State;
+  files: App["files"];
+  drops: { scene: Contents; probe: Contents };
+  sizes: { reduce: number; size: [number, number] }[];
+}
+
+const LOADING = "Loading …";
 
 /** The maximum total size of files [bytes]: WebAssembly must also hold the data decoded from them. */
 const MAX_FILES = 1 << 30;
@@ -158,13 +170,14 @@ export class App {
     this.history.note(this.state);
     this.forgetError();
     $("wrong").hidden = true;
+    if ("env" in change || "scene" in change || "reduce" in change) $("smaller").hidden = true;
     // The browser's Back leads to the last panel or step.
     const hash = `#${toHash(this.state)}`;
     if (("panel" in change || "step" in change) && hash !== location.hash) {
       history.pushState(null, "", hash);
       this.address = location.hash;
     } else this.keepInAddress();
-    if (["scene", "material", "ground", "env", "rows", "rotate", "ev", "scale"].some((key) => key in change)) this.load();
+    if (["scene", "material", "materials", "ground", "env", "rows", "reduce", "rotate", "ev", "scale"].some((key) => key in change)) this.load();
     else this.emit(what);
   }
 
@@ -192,14 +205,16 @@ export class App {
 
   /** The engine's settings for scene and light, with stand-ins for missing files. */
   private keys() {
-    const { material, ground, rows, rotate, ev, scale } = this.state, { missing } = this;
+    const { material, materials, ground, rows, reduce, rotate, ev, scale } = this.state, { missing } = this;
     const scene = missing.scene ? DEFAULT.scene : this.state.scene, probe = missing.env ? DEFAULT.env : this.state.env;
-    return { scene: JSON.stringify({ scene, material, ground }), env: JSON.stringify({ probe, rows, exposure: ev, scale }), rotate };
+    return { scene: JSON.stringify({ scene, material, materials: missing.scene ? {} : materials, ground }), env: JSON.stringify({ probe, rows, reduce: isBuiltinProbe(probe) ? 1 : reduce, exposure: ev, scale }), rotate };
   }
 
   /** Loads the parts of the state that are not loaded yet, then notifies the panels. */
   readonly load = latest(async () => {
     let what: Change = "render";
+    // What takes long is said before it has taken a fifth of a second.
+    const busy = setTimeout(() => this.progress(LOADING), 150);
     try {
       const { scene, env } = this.keys();
       if (this.loaded.scene !== scene || this.loaded.env !== env) what = await this.loadWhatFits();
@@ -210,14 +225,19 @@ export class App {
         if (what === "render") what = "turn";
       }
     } catch (error) {
+      const offer = await this.smallerMaps();
       await this.goBack();
       this.tell((error as Error).message, true);
+      this.offerSmaller(offer);
       // A link with a bad material shows the scene's own.
-      if (!this.good && this.state.material) {
-        this.state.material = "";
+      if (!this.good && (this.state.material || Object.keys(this.state.materials).length)) {
+        Object.assign(this.state, { material: "", materials: {} });
         this.load();
       }
       return;
+    } finally {
+      clearTimeout(busy);
+      if ($("status").textContent === LOADING) this.tell("");
     }
     this.good = { state: { ...this.state }, files: this.files, drops: this.drops, loaded: { ...this.loaded } };
     this.tellMissing();
@@ -230,7 +250,8 @@ export class App {
     const { engines } = this, all = engines.hosts.length;
     const bytes = this.contents().reduce((sum, { bytes }) => sum + bytes.length, 0);
     // One engine more renders references.
-    const isSmall = (all + 1) * (ENGINE_MEMORY + DECODED * bytes) <= engines.memory;
+    // Of a map that is too large as a whole, the size of the file says little.
+    const isSmall = this.state.reduce === 1 && (all + 1) * (ENGINE_MEMORY + DECODED * bytes) <= engines.memory;
     const isMeasured = isSmall || this.measured === this.drops;
     const fresh = engines.use(isSmall ? all : isMeasured ? engines.active : 1);
     if (fresh.length) this.loaded = { scene: "", env: "", rotate: NaN };
@@ -271,7 +292,7 @@ export class App {
   private adopt({ environment }: SceneReport) {
     if (this.adopts && environment) {
       const { probe, rotate, scale, exposure } = environment;
-      Object.assign(this.state, { env: probe, rotate, scale, ev: exposure });
+      Object.assign(this.state, { env: probe, reduce: 1, rotate, scale, ev: exposure });
       this.keepInAddress();
     }
     if (this.adopts) this.emit("files");
@@ -293,6 +314,41 @@ export class App {
     if (names.length) wanted.textContent = `This link contains no files: drop ${names.join(" and ")} here. Until then the page shows ${this.missing.scene ? DEFAULT.scene : this.state.scene} under ${this.missing.env ? DEFAULT.env : this.envName}.`;
   }
 
+  /** What failed to load, if its map fits at a smaller size. */
+  private async smallerMaps(): Promise<Offer | null> {
+    const { state, files, drops } = this;
+    if (isBuiltinProbe(state.env) || this.missing.env || this.loaded.env === this.keys().env) return null;
+    const all = JSON.parse(await this.engines.call("smallerMaps", state.env).catch(() => "[]")) as Offer["sizes"];
+    const sizes = all.filter(({ reduce }) => reduce > state.reduce);
+    return sizes.length ? { state: { ...state }, files, drops, sizes } : null;
+  }
+
+  /** Offers a map at the sizes at which it fits. */
+  private offerSmaller(offer: Offer | null) {
+    const notice = $("smaller");
+    notice.hidden = !offer;
+    if (!offer) return;
+    const { state: { env }, sizes } = offer, size = ({ size: [width, height] }: Offer["sizes"][0], by = 1) => `${by * width} × ${by * height}`;
+    const buttons = sizes.slice(0, 2).map((smaller) => {
+      const name = { 2: "Half", 4: "A quarter", 8: "An eighth" }[smaller.reduce];
+      const button = h("button", { type: "button" }, `${name}: ${size(smaller)}`);
+      button.addEventListener("click", () => this.take(offer, smaller.reduce));
+      return button;
+    });
+    notice.replaceChildren(h("p", {}, `${fileName(env)} has ${size(sizes[0], sizes[0].reduce)} texels, which this page cannot hold. Averaged, its light stays the same:`), h("div", { class: "row" }, ...buttons));
+  }
+
+  /** Loads what failed to load with a smaller map. */
+  private take({ state, files, drops }: Offer, reduce: number) {
+    const { scene, material, materials, camera, pixel, env, rotate, ev, scale, exposure } = state;
+    Object.assign(this.state, { scene, material, materials, camera, pixel, env, rotate, ev, scale, exposure });
+    Object.assign(this, { files, drops });
+    this.revision++;
+    this.emit("files");
+    this.tell("Reading …");
+    this.set({ reduce });
+  }
+
   /** Restores the last good configuration after a file fails to load. */
   private async goBack() {
     const { good, state } = this;
@@ -300,12 +356,12 @@ export class App {
     if (!good) return;
     if (good.drops === this.drops && good.state.scene === state.scene && good.state.env === state.env) {
       // Only the material fails. Its text stays in the field, to be corrected.
-      state.material = good.state.material;
+      Object.assign(state, { material: good.state.material, materials: good.state.materials });
       this.keepInAddress();
       return;
     }
-    const { scene, material, camera, pixel, env, rotate, ev, scale, exposure } = good.state;
-    Object.assign(state, { scene, material, camera, pixel, env, rotate, ev, scale, exposure });
+    const { scene, material, materials, camera, pixel, env, reduce, rotate, ev, scale, exposure } = good.state;
+    Object.assign(state, { scene, material, materials, camera, pixel, env, reduce, rotate, ev, scale, exposure });
     this.files = good.files;
     this.drops = good.drops;
     this.revision++;
@@ -414,8 +470,8 @@ export class App {
     const [scene, probe] = [wanted(scenes, missing.scene), wanted(probes, missing.env)];
     this.adopts = scenes.length > 0 && !scene;
     const change: Partial<State> = {
-      ...(scene ? { scene } : scenes.length ? { scene: scenes[0], camera: null, material: "", pixel: null } : {}),
-      ...(probe ? { env: probe } : probes.length ? { env: probes[0], rotate: 0, ev: 0, scale: 1, exposure: null } : {}),
+      ...(scene ? { scene } : scenes.length ? { scene: scenes[0], camera: null, material: "", materials: {}, pixel: null } : {}),
+      ...(probe ? { env: probe } : probes.length ? { env: probes[0], reduce: 1, rotate: 0, ev: 0, scale: 1, exposure: null } : {}),
     };
     Object.assign(this.state, change);
     this.emit("files");

@@ -259,16 +259,17 @@ export function strategyEditor(place: HTMLElement, text: string, change: (text: 
   place.className = "controls";
 }
 
-/** Puts controls of a material's text into `place`; `select` holds the model's name. */
-export function materialEditor(select: HTMLSelectElement, place: HTMLElement, text: string, change: (text: string) => void) {
+/** Puts controls of a material's text into `place`; `select` holds the model's name. An empty text leaves what the scene
+ *  brings, which is called `own` and, if its text `start` is not empty, is where the controls of its model start. */
+export function materialEditor(select: HTMLSelectElement, place: HTMLElement, text: string, own: string, start: string, change: (text: string) => void) {
   const kind = text ? kindOf(MATERIALS, text) : undefined;
   const known = !text || kind;
-  fill(select, [["", "as in the scene"], ...MATERIALS.map((k): [string, string] => [k.key, k.label]), ...(known ? [] : [["text", "as text"] as [string, string]])], kind?.key ?? (text ? "text" : ""));
+  fill(select, [["", own], ...MATERIALS.map((k): [string, string] => [k.key, k.label]), ...(known ? [] : [["text", "as text"] as [string, string]])], kind?.key ?? (text ? "text" : ""));
   place.className = "controls";
   place.replaceChildren(...(kind ? controls(kind, text, change) : []));
   select.onchange = () => {
-    const next = kindOf(MATERIALS, select.value), fresh = next ? usual(next) : "";
+    const next = kindOf(MATERIALS, select.value), fresh = !next ? "" : kindOf([next], start) ? start : usual(next);
     change(fresh);
-    materialEditor(select, place, fresh, change);
+    materialEditor(select, place, fresh, own, start, change);
   };
 }

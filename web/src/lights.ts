@@ -3,7 +3,7 @@
 import type { App, Change } from "./app";
 import { $, degrees, h, latest, percentage, save, short, words } from "./dom";
 import { Film, FilmView } from "./film";
-import { fileWord, isBuiltinProbe, quoted } from "./state";
+import { lightWords, quoted } from "./state";
 
 const WIDTH = 768, SPHERE = 160;
 
@@ -18,6 +18,7 @@ const STEP = 700;
 /** How the methods divide a region. */
 const RULES: Record<string, string> = {
   "median-cut": "across its longer side, into parts of equal energy",
+  "variance-minimization:2009": "where the larger of both parts’ variances on the map is smallest",
   "variance-minimization": "where the sum of both parts’ variances is smallest",
 };
 
@@ -83,11 +84,15 @@ export class LightsPanel {
     $("refine").addEventListener("change", () => app.set({ refine: $<HTMLInputElement>("refine").checked }, "panel"));
     $("sun").addEventListener("change", () => {
       const sun = $<HTMLInputElement>("sun").checked;
-      app.set({ sun, leave: app.state.leave && sun }, "panel");
+      app.set({ sun, leave: app.state.leave && (sun || app.state.lamps > 0) }, "panel");
+    });
+    $("lamps").addEventListener("change", () => {
+      const lamps = Math.min(Math.max(Math.round(Number($<HTMLInputElement>("lamps").value)) || 0, 0), 64);
+      app.set({ lamps, leave: app.state.leave && (app.state.sun || lamps > 0) }, "panel");
     });
     $("leave").addEventListener("change", () => {
       const leave = $<HTMLInputElement>("leave").checked;
-      app.set({ leave, sun: app.state.sun || leave }, "panel");
+      app.set({ leave, sun: app.state.sun || (leave && !app.state.lamps) }, "panel");
     });
     $("gloss").addEventListener("change", () => app.set({ gloss: Number($<HTMLSelectElement>("gloss").value) }, "panel"));
   }
@@ -128,6 +133,7 @@ export class LightsPanel {
     $<HTMLSelectElement>("method").value = state.method;
     $<HTMLInputElement>("sun").checked = state.sun;
     $<HTMLInputElement>("leave").checked = state.leave;
+    $<HTMLInputElement>("lamps").value = String(state.lamps);
     const gloss = $<HTMLSelectElement>("gloss"), exponent = String(state.gloss);
     if (![...gloss.options].some(({ value }) => value === exponent)) gloss.append(new Option(`glossy, cosⁿ with n = ${exponent}`, exponent));
     gloss.value = exponent;
@@ -252,8 +258,7 @@ export class LightsPanel {
       button(`rig.${format.extension}`, () => app.engines.call("rigFile", settings, format.name, app.envName) as Promise<Uint8Array>, READERS[format.name])));
     const domes = [...new Set(rig.formats.flatMap((format) => format.dome ?? []))];
     $("dome-files").replaceChildren(...domes.map((name) => button(name, () => app.engines.call("domeFile", settings, name) as Promise<Uint8Array>)));
-    const command = ["domelight", "lights", fileWord(state.env), ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
-      ...(state.rotate ? [`--env-rotate=${state.rotate}`] : []), ...(state.scale === 1 ? [] : [`--env-scale=${state.scale}`]), ...(state.ev ? [`--env-exposure=${state.ev}`] : []), ...(state.sun ? ["--sun"] : []), ...(state.lamps ? [`--lamps=${state.lamps}`] : []),
+    const command = ["domelight", "lights", ...lightWords(state), ...(state.sun ? ["--sun"] : []), ...(state.lamps ? [`--lamps=${state.lamps}`] : []),
       ...(leave ? [] : ["-n", String(state.lights)]), ...(rig.residual ? ["--keep-residual", "dome.exr"] : []), "--method", state.method, "-o", "rig.json"];
     // The program refines.
     $("rig-command").hidden = state.method === "variance-minimization" && !state.refine;

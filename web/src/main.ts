@@ -2,6 +2,7 @@
 
 import { App } from "./app";
 import { $ } from "./dom";
+import { EngineLight } from "./engine_light";
 import { Engines } from "./engines";
 import { explain, showMeanings } from "./glossary";
 import { Lecture } from "./lecture";
@@ -36,6 +37,7 @@ async function main() {
   const map = new MapPanel(app);
   new XrayPanel(app);
   new LightsPanel(app);
+  new EngineLight(app);
   const lecture = new Lecture(app);
   wireTabs(app);
   wireIntro(app);

@@ -194,8 +194,8 @@ export class MapPanel {
 
   private async countRays(pixel: string) {
     const strategy = this.countedStrategy, { engines, state } = this.app;
-    const { env, ev, rows, rotate, scene, material } = state;
-    const of = JSON.stringify([strategy, pixel, state.mapping, env, ev, rows, rotate, scene, material]);
+    const { env, ev, rows, rotate, scene, material, materials } = state;
+    const of = JSON.stringify([strategy, pixel, state.mapping, env, ev, rows, rotate, scene, material, materials]);
     if (!strategy || this.counted?.of === of) return;
     this.counted = null;
     this.counted = { of, density: await engines.call("rayDensity", pixel, strategy, state.mapping, LAYER) };

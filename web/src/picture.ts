@@ -2,12 +2,13 @@
 
 import type { App, Change } from "./app";
 import { $, color, count, degrees, fill, save, short, signed, stops, words } from "./dom";
-import { materialEditor, strategyEditor } from "./editors";
+import { strategyEditor } from "./editors";
 import type { Camera, Host, Job, RenderSettings } from "./engines";
 import { ErrorPlot, type Measured } from "./errors";
 import { Film, FilmView } from "./film";
 import { onFigureWidth } from "./plot";
 import type { Update } from "./protocol";
+import { MaterialControls } from "./materials";
 import { Reference } from "./reference";
 import { DEFAULT, PROBES, SCENES, addressOf, command, commandWords, fileName, isBuiltinProbe } from "./state";
 import { CURVES, CURVE_NAMES, type Curve } from "./tone";
@@ -46,6 +47,7 @@ export class PicturePanel {
   /** The last automatic exposure, the view that it belongs to, and the light and scene for which it is a good guess. */
   private automatic = { exposure: 0, view: "", light: "" };
   private reference: Reference;
+  private materials: MaterialControls;
   private referTimer = 0;
   private lastPlot = 0;
   /** The settings that determine the rendered picture. */
@@ -65,6 +67,7 @@ export class PicturePanel {
       failed: (job, error) => this.failed(job, error),
     };
     this.reference = new Reference(app, () => this.referenceChanged(), () => this.isReferred());
+    this.materials = new MaterialControls(app);
     app.on((what) => this.changed(what));
     this.wireControls();
     this.wireCamera();
@@ -76,6 +79,7 @@ export class PicturePanel {
   private changed(what: Change) {
     if (what === "all" || what === "files") this.fillControls();
     if (what === "scene" || what === "camera") this.fillCameras();
+    if (what === "scene") this.materials.refresh();
     if (what === "panel" && this.postponed) this.render(true);
     if (what === "files" || what === "panel") return;
     if (what === "pixel" || what === "view") {
@@ -307,7 +311,7 @@ export class PicturePanel {
 
   /** Computes the program's automatic exposure for the state, unless it is known. */
   private async expose() {
-    const view = JSON.stringify([this.lightKey, this.app.state.material, this.app.state.ground, this.app.state.rotate, this.app.camera]);
+    const view = JSON.stringify([this.lightKey, this.app.state.material, this.app.state.materials, this.app.state.ground, this.app.state.rotate, this.app.camera]);
     const light = this.lightKey;
     if (this.automatic.view === view) {
       this.showExposure(this.automatic.exposure);
@@ -495,7 +499,7 @@ export class PicturePanel {
     const box = $("viewer").getBoundingClientRect(), { size } = this.app.state;
     const at = (x: number, n: number) => Math.min(Math.max(Math.floor(x / n * size), 0), size - 1);
     this.app.set({ pixel: [at(event.clientX - box.left, box.width), at(event.clientY - box.top, box.height)] }, "pixel");
-    this.app.tell("Pixel picked: the X-ray and Map panels show its samples");
+    void this.materials.choose().then((name) => this.app.tell(`Pixel picked: the X-ray and Map panels show its samples${name && `; its material is ${name}`}`));
   }
 
   // ---- controls
@@ -510,13 +514,13 @@ export class PicturePanel {
     $<HTMLSelectElement>("view").value = state.view;
     $<HTMLInputElement>("ground").checked = state.ground;
     $<HTMLInputElement>("hide").checked = state.hide;
-    for (const id of ["spp", "size", "seed", "rotate", "ev", "material"] as const) $<HTMLInputElement>(id).value = String(state[id]);
+    for (const id of ["spp", "size", "seed", "rotate", "ev"] as const) $<HTMLInputElement>(id).value = String(state[id]);
     $("rotate-value").textContent = degrees(state.rotate);
     $("ev-value").textContent = stops(state.ev);
     $<HTMLSelectElement>("equal").value = state.equal;
     $<HTMLInputElement>("split").checked = !!state.beside;
     $("beside").hidden = !state.beside;
-    this.fillMaterial();
+    this.materials.fill();
     strategyEditor($("strategy-editor"), state.strategy, (strategy) => app.set({ strategy }));
     strategyEditor($("beside-editor"), state.beside || "mis:1:1", (beside) => app.set({ beside }));
   }
@@ -530,31 +534,16 @@ export class PicturePanel {
     fill($("camera"), chosen < 0 ? [...names, ["-1", "custom"]] : names, String(chosen));
   }
 
-  private materialTimer = 0;
-  private fillMaterial() {
-    materialEditor($("model"), $("material-numbers"), this.app.state.material, (material) => {
-      $<HTMLInputElement>("material").value = material;
-      clearTimeout(this.materialTimer);
-      this.materialTimer = setTimeout(() => this.app.set({ material }), 60) as unknown as number;
-    });
-  }
-
   private wireControls() {
     const { app } = this;
     const on = (id: string, event: string, f: (input: HTMLInputElement) => void) =>
       $(id).addEventListener(event, () => f($<HTMLInputElement>(id)));
     on("scene", "change", (i) => {
-      app.set({ scene: i.value, camera: null, material: "", pixel: null });
-      $<HTMLInputElement>("material").value = "";
-      this.fillMaterial();
+      app.set({ scene: i.value, camera: null, material: "", materials: {}, pixel: null });
     });
-    on("env", "change", (i) => app.set({ env: i.value, exposure: null }));
+    on("env", "change", (i) => app.set({ env: i.value, reduce: 1, exposure: null }));
     on("ground", "change", (i) => app.set({ ground: i.checked }));
     on("hide", "change", (i) => app.set({ hide: i.checked }));
-    on("material", "change", (i) => {
-      app.set({ material: i.value.trim() });
-      this.fillMaterial();
-    });
     on("rotate", "input", (i) => {
       $("rotate-value").textContent = degrees(Number(i.value));
       app.set({ rotate: Number(i.value) });

@@ -45,8 +45,8 @@ export class Reference {
 
   /** Chooses the reference of a picture, without rendering. */
   choose(of: RenderSettings) {
-    const { scene, material, ground, env, rows, rotate, ev, scale } = this.app.state, { width, height, hideEnvironment, camera } = of;
-    const key = JSON.stringify([this.app.revision, this.app.missing, scene, material, ground, env, rows, rotate, ev, scale, width, height, hideEnvironment, camera]);
+    const { scene, material, materials, ground, env, rows, reduce, rotate, ev, scale } = this.app.state, { width, height, hideEnvironment, camera } = of;
+    const key = JSON.stringify([this.app.revision, this.app.missing, scene, material, materials, ground, env, rows, reduce, rotate, ev, scale, width, height, hideEnvironment, camera]);
     if (this.current?.key === key) return;
     this.stop();
     this.settings = of;

@@ -9,7 +9,7 @@ export interface Situation {
 }
 
 /** What all situations begin with. */
-const PLAIN: Partial<State> = { scene: "sphere", material: "", ground: false, hide: false, env: "sky", rotate: 125, ev: 0, scale: 1, camera: null, exposure: null, beside: "", equal: "rays", view: "picture", mapping: "lat-long", layer: "" };
+const PLAIN: Partial<State> = { scene: "sphere", material: "", materials: {}, ground: false, hide: false, env: "sky", rotate: 125, ev: 0, scale: 1, camera: null, exposure: null, beside: "", equal: "rays", view: "picture", mapping: "lat-long", layer: "" };
 const PHONG = "phong:50:1:0", BRUSHED = "ward:0.3:0.08:0.9";
 
 /** A pixel in the middle of the upper left of the scene, as a share of the picture's size. */

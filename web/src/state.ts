@@ -9,10 +9,14 @@ export interface State {
   panel: string;
   scene: string;
   material: string;
+  /** Single materials of the scene by their index, which `material` leaves alone. */
+  materials: Record<string, string>;
   ground: boolean;
   hide: boolean;
   env: string;
   rows: number;
+  /** How many columns and rows of a file's map become one, where the map is too large for the page. */
+  reduce: number;
   rotate: number;
   ev: number;
   /** A factor on the light. */
@@ -54,8 +58,8 @@ export interface State {
 }
 
 export const DEFAULT: State = {
-  panel: "picture", scene: "statue", material: "", ground: false, hide: false,
-  env: "sky", rows: 256, rotate: 125, ev: 0, scale: 1, size: 640, spp: 32, seed: 0,
+  panel: "picture", scene: "statue", material: "", materials: {}, ground: false, hide: false,
+  env: "sky", rows: 256, reduce: 1, rotate: 125, ev: 0, scale: 1, size: 640, spp: 32, seed: 0,
   strategy: "product:8", beside: "", equal: "rays", camera: null, exposure: null, curve: "agx", view: "picture",
   mapping: "lat-long", layer: "", samples: 4, method: "variance-minimization", refine: true, lights: 64, sun: false, lamps: 0, leave: false, gloss: 0,
   pixel: null, compared: "brdf:1 environment:1 mis:1:1 product:8", step: 1, figure: "",
@@ -110,6 +114,10 @@ export function fromHash(hash: string): { state: State; wrong: string[] } {
   clamp("lamps", 4096, 0);
   clamp("gloss", 100, 0);
   clamp("step", STEPS.length);
+  if (![1, 2, 4, 8].includes(state.reduce as number)) {
+    wrong.push(`reduce=${state.reduce}`);
+    state.reduce = 1;
+  }
   if (!((state.scale as number) >= 0)) {
     wrong.push(`scale=${state.scale}`);
     state.scale = 1;
@@ -133,6 +141,9 @@ function isOfKind(key: string, value: unknown, fallback: unknown): boolean {
   const numbers = (x: unknown, n: number) => Array.isArray(x) && x.length === n && x.every((c) => Number.isFinite(c));
   if (key === "pixel") return numbers(value, 2);
   if (key === "exposure") return Number.isFinite(value);
+  if (key === "materials") {
+    return !!value && typeof value === "object" && Object.entries(value).every(([index, text]) => /^\d{1,9}$/.test(index) && typeof text === "string");
+  }
   if (key === "camera") {
     const camera = value as Camera | null;
     return !!camera && numbers(camera.origin, 3) && numbers(camera.target, 3) && numbers(camera.up, 3)
@@ -145,6 +156,12 @@ export const quoted = (word: string) => (/^[\w@%+=:,./-]+$/.test(word) ? word : 
 
 /** A file's name as a word of a command, where it must not look like an option. */
 export const fileWord = (name: string) => (name.startsWith("-") ? `./${name}` : name);
+
+/** The light as the program's commands about maps take it, word by word. */
+export function lightWords({ env, rows, rotate, scale, ev }: State): string[] {
+  return [fileWord(env), ...(isBuiltinProbe(env) ? [`--env-rows=${rows}`] : []), ...(rotate ? [`--env-rotate=${rotate}`] : []),
+    ...(scale === 1 ? [] : [`--env-scale=${scale}`]), ...(ev ? [`--env-exposure=${ev}`] : [])];
+}
 
 /** The command that renders the same picture, word by word. */
 export function commandWords(state: State): string[] {

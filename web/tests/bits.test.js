@@ -118,6 +118,43 @@ test("exposure and curve are the command line's", async () => {
   await done();
 });
 
+test("light for engines and shaders has the program's bytes", async () => {
+  const folder = mkdtempSync(join(tmpdir(), "domelight-web-"));
+  const { page, done } = await open("panel=lights&scene=sphere&env=studio&rows=32&rotate=30&ev=0.5&size=32&spp=1&lights=8&sun=true");
+  await page.waitForSelector("#ibl-files button");
+  await page.waitForSelector("html[data-rig]");
+  /** Compares the files of buttons with those that the command writes. */
+  const compare = async (buttons, command, ...more) => {
+    const words = (await page.$eval(command, (pre) => pre.textContent)).split(" ").slice(1);
+    execFileSync(program, ["-q", ...words, ...more], { cwd: folder });
+    for (const button of await page.$$(buttons)) {
+      const [download] = await Promise.all([page.waitForEvent("download"), button.click()]);
+      const name = download.suggestedFilename(), expected = readFileSync(join(folder, name));
+      assert.ok(readFileSync(await download.path()).equals(expected), name);
+      await page.waitForTimeout(250);
+    }
+  };
+  try {
+    await page.selectOption("#ibl-size", "64");
+    await compare("#ibl-files button", "#ibl-command");
+    await page.selectOption("#ibl-engine", "filament");
+    await page.selectOption("#ibl-sun", "clamp");
+    await page.fill("#ibl-clamp", "20");
+    await page.press("#ibl-clamp", "Tab");
+    await page.selectOption("#ibl-texels", "half");
+    await page.selectOption("#ibl-container", "dds");
+    assert.match(await page.$eval("#ibl-command", (pre) => pre.textContent), /--for filament --size 64 --sun clamp:20 --texels half$/);
+    await compare("#ibl-files button", "#ibl-command");
+    await page.selectOption("#tables-language", "glsl");
+    await page.check("#tables-compensated");
+    await compare("#tables-files button", "#tables-command");
+    await compare(["json", "tscn", "usda"].map((kind) => `#formats button:has-text('rig.${kind}')`).join(), "#rig-command", "-o", "rig.tscn", "-o", "rig.usda");
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+  await done();
+});
+
 for (const query of ["", "?2d"]) {
   test(`what is seen is the picture's PNG, by every curve${query && ", without WebGL2"}`, async () => {
     // Bright metal and its highlights, and a background.

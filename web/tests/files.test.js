@@ -81,6 +81,33 @@ test("a scene stays when a probe is dropped, and its material can be changed", a
   await done();
 });
 
+/** A Radiance picture of two colors, one above the other, in runs. */
+function runs(width, height) {
+  const line = (bytes) => {
+    const component = (byte) => [...Array(Math.floor(width / 127)).fill([255, byte]), [128 + width % 127, byte]].flat();
+    return Buffer.from([2, 2, width >> 8, width & 255, ...bytes.flatMap(component)]);
+  };
+  const [above, below] = [[128, 128, 200, 129], [64, 32, 16, 129]].map(line);
+  return Buffer.concat([Buffer.from(`#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y ${height} +X ${width}\n`), ...Array.from({ length: height }, (_, y) => (y < height / 2 ? above : below))]);
+}
+
+test("a map of 16k is offered at half and a quarter of its size", async () => {
+  const { page, done } = await open("size=32&spp=1&rows=64&scene=sphere&strategy=mis:1:1");
+  await rendered(page);
+  await drop(page, [put("vast.hdr", runs(16384, 8192))]);
+  await page.waitForSelector("#smaller:not([hidden])");
+  assert.match(await text(page, "#smaller"), /vast\.hdr has 16384 × 8192 texels/);
+  assert.deepEqual(await page.$$eval("#smaller button", (all) => all.map(({ textContent }) => textContent)), ["Half: 8192 × 4096", "A quarter: 4096 × 2048"]);
+  assert.equal(await page.inputValue("#env"), "sky");
+  await renderedAnew(page, () => page.click("#smaller button:has-text('quarter')"));
+  assert.equal(await page.inputValue("#env"), "vast.hdr");
+  assert.equal(await page.isVisible("#smaller"), false);
+  assert.deepEqual(await page.evaluate(() => window.domelight.app.probe.size), [4096, 2048]);
+  assert.match(await text(page, "#warnings"), /its 16384x8192 texels are averaged to 4096x2048, with the same light/);
+  await page.waitForFunction(() => /reduce=4/.test(location.hash));
+  await done();
+});
+
 test("files beyond what memory holds are refused before they are read", async () => {
   const { page, done } = await open(SMALL);
   await rendered(page);

@@ -313,6 +313,50 @@ test("samples come one after the other", async () => {
   await done();
 });
 
+test("one material of a model is chosen in the picture and changed alone", async () => {
+  const { page, done } = await open("scene=statue&size=64&spp=2&rows=64&strategy=mis:1:1");
+  await rendered(page);
+  const film = () => page.evaluate(() => [...window.domelight.picture.films[0].pixels]);
+  const chosen = () => page.$eval("#one-material", (select) => select.selectedOptions[0].textContent);
+  const pick = async (x, y, name) => {
+    const { width, height } = await page.locator("#viewer").boundingBox();
+    await page.click("#viewer", { position: { x: x * width, y: y * height } });
+    await page.waitForFunction((name) => document.getElementById("status").textContent.endsWith(`its material is ${name}`), name);
+  };
+  assert.deepEqual(await page.$$eval("#one-material option", (all) => all.map(({ textContent }) => textContent)), ["all of the subject", "marble", "stone", "floor"]);
+  const before = await film();
+  await pick(0.1, 0.9, "floor");
+  assert.equal(await chosen(), "floor");
+  await pick(0.5, 0.4, "marble");
+  assert.equal(await chosen(), "marble");
+  assert.match(await page.getAttribute("#material", "placeholder"), /^gltf:0\.76,0\.71,0\.64:0:0\.42 in the file$/);
+  // The controls of its own model start with its own values.
+  await renderedAnew(page, () => page.selectOption("#model", "gltf"));
+  assert.equal(await page.inputValue("#material"), "gltf:0.76,0.71,0.64:0:0.42");
+  await renderedAnew(page, () => page.selectOption("#model", "diffuse"));
+  assert.equal(await chosen(), "marble, changed");
+  assert.equal(await page.isVisible("#command-lacks"), true);
+  const after = await film(), at = (pixels, x, y) => pixels.slice(4 * (y * 64 + x), 4 * (y * 64 + x) + 3);
+  assert.notDeepEqual(at(after, 32, 26), at(before, 32, 26));
+  assert.deepEqual(at(after, 6, 58), at(before, 6, 58), "the floor stays");
+  // A link carries it.
+  await page.waitForFunction(() => /materials=/.test(location.hash));
+  const { page: other, done: alsoDone } = await open((await page.url()).split("#")[1]);
+  await rendered(other);
+  assert.deepEqual(await other.evaluate(() => [...window.domelight.picture.films[0].pixels]), after);
+  await alsoDone();
+  // With another material for the rest, it stays.
+  await page.selectOption("#one-material", "");
+  await renderedAnew(page, () => page.selectOption("#model", "ggx"));
+  assert.deepEqual(at(await film(), 32, 26), at(after, 32, 26));
+  await renderedAnew(page, () => page.selectOption("#model", ""));
+  await page.selectOption("#one-material", { label: "marble, changed" });
+  await renderedAnew(page, () => page.click("#as-in-file"));
+  assert.deepEqual(await film(), before);
+  assert.equal(await page.isVisible("#as-in-file"), false);
+  await done();
+});
+
 test("lights: regions, files of every format, and what is left", async () => {
   const { page, done } = await open(SMALL);
   await show(page, "lights");

@@ -101,7 +101,7 @@ impl IblArguments {
         match self.sun {
             SunTreatment::Keep => Ok((environment, None)),
             SunTreatment::Clamp(radiance) => {
-                let (clamped, lost) = clamped(&environment, radiance)?;
+                let (clamped, lost) = environment.clamped(radiance)?;
                 if lost > 0.0 {
                     let percent = 100.0 * lost;
                     warn(quiet, &format!("{probe}: clamped to {radiance}, -{percent:.2} % light"));
@@ -148,22 +148,6 @@ impl IblArguments {
     fn terms(&self) -> TableTerms {
         self.engine.map_or(TableTerms::ScaleAndBias, Engine::table)
     }
-}
-
-/// The environment with every texel scaled until its brightest channel is at most `radiance`, and the share of the light
-/// that is lost.
-fn clamped(environment: &Environment, radiance: f32) -> Result<(Environment, f64)> {
-    let mut map = environment.radiance_map().into_owned();
-    for texel in &mut map.pixels {
-        let brightest = texel.max_component();
-        if brightest > radiance {
-            *texel *= radiance / brightest;
-        }
-    }
-    let clamped = Environment::new(map, environment.orientation(), 1.0)?;
-    let [before, after] = [environment, &clamped].map(|e| e.power() * e.unit());
-    let lost = if before > 0.0 { (1.0 - after / before).max(0.0) } else { 0.0 };
-    Ok((clamped, lost))
 }
 
 /// What a file holds.

@@ -9,6 +9,7 @@ mod lights;
 mod lobe;
 mod map;
 mod picture;
+mod prefilter;
 mod rows;
 mod session;
 mod setup;
@@ -22,6 +23,7 @@ use domelight::scene::Scene;
 use wasm_bindgen::prelude::*;
 
 use files::Files;
+use prefilter::Textures;
 use session::Session;
 use setup::{LoadedScene, Setup};
 
@@ -43,6 +45,8 @@ pub struct Engine {
     parts: Vec<Checkpoint>,
     /// The last rig, and its settings.
     extraction: Option<(String, Extraction)>,
+    /// The last prefiltered light, its settings and what there is to say of it.
+    prefiltered: Option<(String, String, Textures)>,
 }
 
 #[wasm_bindgen]

@@ -37,6 +37,9 @@ struct LightsState {
 enum MethodName {
     MedianCut,
     VarianceMinimization,
+    /// The rule of Viriyothai & Debevec 2009.
+    #[serde(rename = "variance-minimization:2009")]
+    Poster,
 }
 
 /// A rig, for the page.
@@ -74,6 +77,7 @@ fn method(name: &MethodName, refine: bool) -> Method {
     let all = VarianceMinimization::default();
     match name {
         MethodName::MedianCut => Method::MedianCut(MedianCut::default()),
+        MethodName::Poster => Method::VarianceMinimization(VarianceMinimization::poster()),
         MethodName::VarianceMinimization if refine => Method::VarianceMinimization(all),
         MethodName::VarianceMinimization => {
             Method::VarianceMinimization(VarianceMinimization { lloyd_steps: 0, ..all })

@@ -5,6 +5,7 @@ use std::rc::Rc;
 use domelight::Rgb;
 use domelight::environment::mapping::{Mapping, UnknownMapping};
 use domelight::environment::{Environment, LatLongGrid, Orientation, UpAxis};
+use domelight::geometry::{Hit, Ray};
 use domelight::math::{Vec3, vec2};
 use domelight::render::visibility;
 use domelight::sampling::{Sampler, SamplerKind};
@@ -212,14 +213,21 @@ fn shadow_rays(
 }
 
 impl Engine {
-    fn pick(&self, json: &str) -> Result<Option<Picked>, JsError> {
+    /// What the middle of a pixel shows of the scene.
+    fn sight(&self, json: &str) -> Result<Option<(Ray, Hit)>, JsError> {
         let Pixel { x, y, width, height, camera } = parse(json)?;
         let (scene, loaded) = self.scene()?;
         let view = loaded.camera(scene, camera, width as f32 / height.max(1) as f32);
         let camera = Camera::new(&view, width, height).map_err(error)?;
         let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
-        let hit = scene.camera_hit(&ray, 0, 0);
-        Ok(hit.map(|hit| Picked { at: scene.shading_point(&ray, &hit), scene: scene.clone() }))
+        Ok(scene.camera_hit(&ray, 0, 0).map(|hit| (ray, hit)))
+    }
+
+    fn pick(&self, json: &str) -> Result<Option<Picked>, JsError> {
+        let (scene, sight) = (&self.scene()?.0, self.sight(json)?);
+        let picked =
+            |(ray, hit)| Picked { at: scene.shading_point(&ray, &hit), scene: scene.clone() };
+        Ok(sight.map(picked))
     }
 
     /// A strategy with what a pilot chooses for one point.
@@ -456,6 +464,17 @@ impl Engine {
         let texels = Texels::new(mapping, width, environment.orientation().up);
         let view = texels.layers(|wi| [counts.density(wi)]);
         Ok(MapView { integrals: vec![counts.integral()], ..view })
+    }
+
+    /// The index of the material at a pixel, among those of the scene and what the settings add; nothing where there is
+    /// no surface.
+    ///
+    /// # Errors
+    /// If the scene is missing.
+    #[wasm_bindgen(js_name = materialAt)]
+    pub fn material_at(&self, pixel: &str) -> Result<Option<u32>, JsError> {
+        let scene = &self.scene()?.0;
+        Ok(self.sight(pixel)?.map(|(_, hit)| scene.material_of(&hit) as u32))
     }
 
     /// The surface at a pixel and its light, as JSON; `null` where there is none.

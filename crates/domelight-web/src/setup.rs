@@ -1,18 +1,21 @@
 //! What is rendered: the page's settings, and the scene and light that they name.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
 use std::str::FromStr;
 
+use domelight::Rgb;
 use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::UpAxis;
 use domelight::environment::builtin::BuiltinProbe;
-use domelight::environment::io::{ProbeOptions, probe_from_bytes};
+use domelight::environment::io::{ProbeOptions, probe_from_bytes, reduced_probe_from_bytes};
 use domelight::math::Vec3;
+use domelight::picture::{memory_to_read, reduced_size};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
-    CameraSettings, EnvironmentSettings, EnvironmentSource, Framing, LoadOptions, Projection,
-    Scene, load_bytes,
+    CameraSettings, EnvironmentSettings, EnvironmentSource, Framing, Layers, LoadOptions, Material,
+    MaterialModel, Projection, Scene, SceneDescription, load_bytes,
 };
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
@@ -33,7 +36,39 @@ pub(crate) struct Setup {
     pub(crate) scene: String,
     /// The subject's, as `--material` has it; empty leaves what the scene brings.
     material: String,
+    /// Single materials of the scene by their index, which the subject's leaves alone.
+    #[serde(default)]
+    materials: BTreeMap<usize, String>,
     ground: bool,
+}
+
+impl Setup {
+    /// Replaces the materials that the settings name.
+    fn replace_materials(&self, description: &mut SceneDescription) -> Result<(), JsError> {
+        let parsed = |text: &str| {
+            let material: MaterialSpec = text.parse().map_err(error)?;
+            Ok::<_, JsError>(Bsdf::from(material))
+        };
+        let n = description.materials.len();
+        let own: Vec<usize> = description.parts.iter().map(|part| part.material).collect();
+        if !self.material.is_empty() {
+            description.set_subject_material(parsed(&self.material)?);
+        }
+        for (&index, text) in &self.materials {
+            let missing = || JsError::new(&format!("material {index}: the scene has only {n}"));
+            let material = description.materials[..n].get_mut(index).ok_or_else(missing)?;
+            // The outline of a leaf and its relief stay.
+            material.model = MaterialModel::Fixed(parsed(text)?);
+            material.layers = Layers::default();
+            material.unlit = false;
+            for (part, &own) in description.parts.iter_mut().zip(&own) {
+                if own == index {
+                    part.material = own;
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What is known of a scene beside its geometry.
@@ -105,6 +140,8 @@ struct SceneReport {
     camera: CameraState,
     /// All of the file, the first of which is `camera`.
     cameras: Vec<CameraReport>,
+    /// Those of the file that are used.
+    materials: Vec<MaterialReport>,
     /// Center and half diagonal of what the camera orbits.
     center: [f32; 3],
     radius: f32,
@@ -118,6 +155,50 @@ struct CameraReport {
     /// Its name, or its number.
     name: String,
     camera: CameraState,
+}
+
+/// One of a scene's materials.
+#[derive(Serialize)]
+struct MaterialReport {
+    index: usize,
+    name: String,
+    /// The material without textures and layers, as `--material` has it; empty if it has no such form.
+    text: String,
+}
+
+impl MaterialReport {
+    fn of(description: &SceneDescription) -> Vec<Self> {
+        let is_used = |index: usize| description.parts.iter().any(|part| part.material == index);
+        let materials = description.materials.iter().enumerate();
+        materials.filter(|(index, _)| is_used(*index)).map(|(i, m)| Self::new(i, m)).collect()
+    }
+
+    fn new(index: usize, material: &Material) -> Self {
+        let color = |Rgb { r, g, b }: Rgb| format!("{},{},{}", short(r), short(g), short(b));
+        let text = match &material.model {
+            MaterialModel::Fixed(_) => String::new(),
+            MaterialModel::Phong(m) if m.specular == Rgb::BLACK => {
+                format!("diffuse:{}", color(m.diffuse))
+            }
+            MaterialModel::Phong(m) => {
+                let exponent = short(m.exponent);
+                format!("phong:{exponent}:{}:{}", color(m.specular), color(m.diffuse))
+            }
+            MaterialModel::MetallicRoughness(m) => {
+                let [metallic, roughness] = [m.metallic, m.roughness].map(short);
+                format!("gltf:{}:{metallic}:{roughness}", color(m.base_color))
+            }
+            MaterialModel::SpecularGlossiness(m) => {
+                format!("gltf:{}:0:{}", color(m.diffuse), short(1.0 - m.glossiness))
+            }
+        };
+        Self { index, name: material.name.clone(), text }
+    }
+}
+
+/// A number with at most three decimals.
+fn short(x: f32) -> f64 {
+    (1000.0 * f64::from(x)).round() / 1000.0
 }
 
 /// The light that a scene names.
@@ -137,11 +218,25 @@ struct Light {
     probe: String,
     /// Rows of a built-in probe.
     rows: usize,
+    /// How many columns and rows of a file's map become one; 1 keeps all.
+    #[serde(default = "whole")]
+    reduce: usize,
     /// \[degrees\]
     rotate: f32,
     scale: f32,
     /// \[stops\]
     exposure: f32,
+}
+
+const fn whole() -> usize {
+    1
+}
+
+/// A smaller size at which a map fits.
+#[derive(Serialize)]
+struct SmallerMap {
+    reduce: usize,
+    size: [usize; 2],
 }
 
 /// What a probe is, for the page.
@@ -163,7 +258,7 @@ pub(crate) fn to_json(value: &impl Serialize) -> String {
 
 #[wasm_bindgen]
 impl Engine {
-    /// Loads and builds a scene: `{"scene", "material", "ground"}`; returns what it brings.
+    /// Loads and builds a scene: `{"scene", "material", "materials", "ground"}`; returns what it brings.
     ///
     /// # Errors
     /// If there is no such scene, its file is damaged, or the material is none.
@@ -184,10 +279,8 @@ impl Engine {
             let loaded = load_bytes(path, bytes, &resolver, &options).map_err(error)?;
             (loaded.description, loaded.warnings)
         };
-        if !setup.material.is_empty() {
-            let material: MaterialSpec = setup.material.parse().map_err(error)?;
-            description.set_subject_material(Bsdf::from(material));
-        }
+        let materials = MaterialReport::of(&description);
+        setup.replace_materials(&mut description)?;
         let up = description.up.unwrap_or_default();
         let framed = description.subject_bounds();
         if setup.ground {
@@ -218,6 +311,7 @@ impl Engine {
             warnings,
             camera: report_camera,
             cameras,
+            materials,
             center: framed.center().to_array(),
             radius: 0.5 * framed.size().length(),
             up: up.vector().to_array(),
@@ -229,7 +323,7 @@ impl Engine {
         Ok(to_json(&report))
     }
 
-    /// Loads a probe: `{"probe", "rows", "rotate", "scale", "exposure"}`; returns its size and what was repaired.
+    /// Loads a probe: `{"probe", "rows", "reduce", "rotate", "scale", "exposure"}`; returns its size and what was repaired.
     ///
     /// # Errors
     /// If there is no such probe or its file is damaged.
@@ -246,7 +340,12 @@ impl Engine {
                 .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
             let options =
                 ProbeOptions { max_memory: Some(MAX_PROBE_MEMORY), ..ProbeOptions::default() };
-            let probe = probe_from_bytes(bytes, &light.probe, &options).map_err(error)?;
+            let name = &light.probe;
+            let probe = match light.reduce {
+                1 => probe_from_bytes(bytes, name, &options),
+                factor => reduced_probe_from_bytes(bytes, name, factor, &options),
+            };
+            let probe = probe.map_err(error)?;
             (probe.image, probe.warnings)
         };
         let up = self.scene.as_ref().map_or(UpAxis::Y, |(_, loaded)| loaded.up);
@@ -261,8 +360,23 @@ impl Engine {
         let report = ProbeReport { size: [map.width, map.height], warnings };
         self.session = None;
         self.extraction = None;
+        self.prefiltered = None;
         self.environment = Some(Rc::new(environment));
         Ok(to_json(&report))
+    }
+
+    /// The sizes, at most half the file's, at which its map can be read where it needs too much memory as a whole: JSON of
+    /// `{"reduce", "size"}`, the largest first. None for other files.
+    #[wasm_bindgen(js_name = smallerMaps)]
+    pub fn smaller_maps(&self, probe: &str) -> String {
+        let bytes = self.files.get(Path::new(probe)).unwrap_or_default();
+        let is_too_large = memory_to_read(bytes).is_ok_and(|needed| needed > MAX_PROBE_MEMORY);
+        let sizes = [2, 4, 8].into_iter().filter_map(|reduce| {
+            let ((width, height), needed) = reduced_size(bytes, reduce).ok()?;
+            let fits = is_too_large && needed <= MAX_PROBE_MEMORY;
+            fits.then_some(SmallerMap { reduce, size: [width, height] })
+        });
+        to_json(&sizes.collect::<Vec<_>>())
     }
 
     /// Turns the environment \[degrees\]; the map is not read again.
@@ -273,6 +387,7 @@ impl Engine {
     pub fn turn_environment(&mut self, rotate: f32) -> Result<(), JsError> {
         self.session = None;
         self.extraction = None;
+        self.prefiltered = None;
         let missing = || JsError::new("there is no environment yet; load one first");
         let environment = self.environment.take().ok_or_else(missing)?;
         let environment = Rc::unwrap_or_clone(environment);

@@ -441,6 +441,25 @@ impl Environment {
         }
     }
 
+    /// The environment with every texel scaled until its brightest channel is at most `radiance` \[W·m⁻²·sr⁻¹\], and the share
+    /// of the light that is lost.
+    ///
+    /// # Errors
+    /// If `radiance` is negative.
+    pub fn clamped(&self, radiance: f32) -> Result<(Self, f64), EnvironmentError> {
+        let mut map = self.radiance_map().into_owned();
+        for texel in &mut map.pixels {
+            let brightest = texel.max_component();
+            if brightest > radiance {
+                *texel *= radiance / brightest;
+            }
+        }
+        let clamped = Self::new(map, self.orientation(), 1.0)?;
+        let [before, after] = [self, &clamped].map(|e| e.power() * e.unit());
+        let lost = if before > 0.0 { (1.0 - after / before).max(0.0) } else { 0.0 };
+        Ok((clamped, lost))
+    }
+
     /// The unit of radiance, power and map \[W·m⁻²·sr⁻¹\]: a power of two, 1 for all but extreme maps.
     pub fn unit(&self) -> f64 {
         self.unit

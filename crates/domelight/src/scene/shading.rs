@@ -30,6 +30,14 @@ impl Scene {
         point
     }
 
+    /// The material, an index into [`Scene::materials`], of a hit that [`Scene::bvh`] reported.
+    ///
+    /// # Panics
+    /// If `hit.triangle` is not one of this scene's.
+    pub fn material_of(&self, hit: &Hit) -> usize {
+        self.locate(hit.triangle).0.material
+    }
+
     /// Sets each of `points` to [`Scene::shading_point`] of one of the `seeing` rays, and each of `constants` to its
     /// material if the BSDF of this is the same everywhere. `hits` has an entry for each ray.
     ///
