@@ -16,7 +16,7 @@
 //! crate's decoder supports only one orientation and drops EXPOSURE.
 
 use super::primaries::{Primaries, to_light, xyz_of_white_to_rec709, xyz_to_rec709};
-use super::reduced::Reduction;
+use super::reduction::Reduction;
 use super::{Format, Picture, PictureErrorKind, allocate, checked_area};
 use crate::environment::mapping::Fisheye;
 use crate::math::functions;

@@ -21,6 +21,7 @@ pub mod pfm;
 pub mod png;
 mod primaries;
 mod reduced;
+mod reduction;
 pub mod texture;
 pub mod tone;
 

@@ -1,43 +1,9 @@
 //! Reads large lat-long maps at a fraction of their size, without the memory for all of their texels.
 
+use super::reduction::Reduction;
 use super::{Format, Picture, PictureError, PictureErrorKind, ReadOptions};
 use super::{exr, format_of, hdr};
-use crate::environment::LatLongGrid;
 use crate::memory;
-
-/// A lat-long map each of whose texels is the mean of `factor` × `factor` texels of a file over their solid angles, so that
-/// its light is the file's.
-pub(super) struct Reduction {
-    /// How many columns and rows of the file become one.
-    pub(super) factor: usize,
-    /// The size of the map.
-    pub(super) width: usize,
-    /// The number of its rows.
-    pub(super) height: usize,
-    /// What a texel of each of the file's rows contributes.
-    pub(super) weights: Vec<f32>,
-}
-
-impl Reduction {
-    /// Of a file with `width` × `height` texels.
-    pub(super) fn new(
-        (width, height): (usize, usize),
-        factor: usize,
-    ) -> Result<Self, PictureErrorKind> {
-        let divides = |n: usize| factor > 0 && n > 0 && n.is_multiple_of(factor);
-        if width != 2 * height || !divides(width) || !divides(height) {
-            return Err(PictureErrorKind::NotReducible { width, height, factor });
-        }
-        let grid = LatLongGrid::new(width, height);
-        let weight = |row: usize| {
-            let first = row - row % factor;
-            let block = factor as f64 * grid.band(first..first + factor);
-            (grid.band(row..row + 1) / block) as f32
-        };
-        let weights = (0..height).map(weight).collect();
-        Ok(Self { factor, width: width / factor, height: height / factor, weights })
-    }
-}
 
 /// The width and height of a lat-long map in a Radiance or OpenEXR file when each `factor` × `factor` texels become one,
 /// and an estimate of the memory that the file and the map need during reading \[bytes\], from the header alone.
@@ -52,7 +18,7 @@ pub fn reduced_size(
     let size = match format_of(bytes) {
         Some(Format::Hdr) => hdr::size(bytes)?,
         Some(Format::Exr) => exr::size(bytes)?,
-        Some(Format::Pfm | Format::Png | Format::Jpeg) => {
+        Some(Format::Pfm | Format::Png | Format::Jpeg | Format::Ktx2 | Format::Dds) => {
             return Err(PictureErrorKind::OnlyWhole);
         }
         None => return Err(PictureErrorKind::UnknownFormat),
@@ -80,7 +46,9 @@ pub fn read_reduced(
         match format_of(bytes) {
             Some(Format::Hdr) => hdr::decode_reduced(bytes, factor),
             Some(Format::Exr) => exr::decode_reduced(bytes, options.layer.as_deref(), factor),
-            Some(Format::Pfm | Format::Png | Format::Jpeg) => Err(PictureErrorKind::OnlyWhole),
+            Some(Format::Pfm | Format::Png | Format::Jpeg | Format::Ktx2 | Format::Dds) => {
+                Err(PictureErrorKind::OnlyWhole)
+            }
             None => Err(PictureErrorKind::UnknownFormat),
         }
     };
@@ -92,6 +60,7 @@ mod tests {
     use super::super::exr::ExrLayers;
     use super::super::{PictureErrorKind, read_bytes};
     use super::*;
+    use crate::environment::LatLongGrid;
     use crate::{Rgb, RgbImage};
 
     /// A map with a gradient and a small sun near the pole.

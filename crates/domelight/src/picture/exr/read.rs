@@ -13,7 +13,7 @@ use super::attributes::{envmap, primaries, to_rec709, window};
 use super::luminance_chroma::LuminanceChroma;
 use super::write::string_attributes;
 use crate::picture::primaries::{to_light, xyz_to_rec709};
-use crate::picture::reduced::Reduction;
+use crate::picture::reduction::Reduction;
 use crate::picture::{
     Format, GuessedLayer, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area,
 };
