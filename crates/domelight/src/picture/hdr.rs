@@ -35,12 +35,6 @@ pub fn decode(bytes: &[u8]) -> Result<Picture, PictureErrorKind> {
     let header = Header::parse(bytes)?;
     let (lines, length) = (header.lines, header.length);
     let area = checked_area(length, lines)?;
-    let (width, height) = header.size();
-    // Before a table of scanlines is made: no scanline takes fewer bytes than this.
-    let (needed, held) = (lines as u64 * least_bytes(length), (bytes.len() - header.end) as u64);
-    if held < needed {
-        return Err(PictureErrorKind::Promises { width, height, needed, held });
-    }
     let starts = scanline_starts(bytes, &header)?;
     let color = ColorTable::new(&header);
     let mut pixels = allocate(Rgb::BLACK, length, lines)?;
@@ -358,6 +352,13 @@ fn is_new(bytes: &[u8], at: usize, length: usize) -> bool {
 
 /// Where each scanline begins, having walked through all of them.
 fn scanline_starts(bytes: &[u8], header: &Header) -> Result<Vec<usize>, PictureErrorKind> {
+    // No scanline takes fewer bytes than this.
+    let needed = header.lines as u64 * least_bytes(header.length);
+    let held = (bytes.len() - header.end) as u64;
+    if held < needed {
+        let (width, height) = header.size();
+        return Err(PictureErrorKind::Promises { width, height, needed, held });
+    }
     let mut at = header.end;
     let mut starts = Vec::with_capacity(header.lines);
     for scanline in 0..header.lines {

@@ -28,8 +28,8 @@ pub fn reduced_size(
 }
 
 /// Decodes the lat-long map in `bytes` with each `factor` × `factor` texels averaged over their solid angles, so that its
-/// light stays the same. There is never more in memory than the smaller map and some rows. Alpha is not read; `name` is for
-/// messages.
+/// light stays the same. There is never more in memory than the smaller map and some rows. Alpha is not read. Infinite
+/// values count as [`OVERFLOWED`](crate::environment::io::OVERFLOWED), with a warning; `name` is for messages.
 ///
 /// # Errors
 /// Those of [`reduced_size`] and [`read_bytes`](super::read_bytes); if the data window of an OpenEXR file is not its
@@ -61,6 +61,7 @@ mod tests {
     use super::super::{PictureErrorKind, read_bytes};
     use super::*;
     use crate::environment::LatLongGrid;
+    use crate::environment::io::OVERFLOWED;
     use crate::{Rgb, RgbImage};
 
     /// A map with a gradient and a small sun near the pole.
@@ -105,6 +106,17 @@ mod tests {
                 assert_eq!(at, 3 / factor * reduced.width + 11 / factor);
             }
         }
+    }
+
+    #[test]
+    fn an_overflowed_sun_keeps_its_size() {
+        let mut map = map();
+        map.pixels[3 * 64 + 11].r = f32::INFINITY;
+        let bytes = ExrLayers::from_image(&map, None).encode().unwrap();
+        let picture = read_reduced(&bytes, "map", 2, &ReadOptions::default()).unwrap();
+        let red = picture.image.pixels[32 + 5].r;
+        assert!((0.28 * OVERFLOWED..0.30 * OVERFLOWED).contains(&red), "{red}");
+        assert_eq!(picture.warnings, ["1 infinite values count as 65504 in the means of texels"]);
     }
 
     #[test]

@@ -12,6 +12,7 @@
 use super::attributes::{envmap, primaries, to_rec709, window};
 use super::luminance_chroma::LuminanceChroma;
 use super::write::string_attributes;
+use crate::environment::io::OVERFLOWED;
 use crate::picture::primaries::{to_light, xyz_to_rec709};
 use crate::picture::reduction::Reduction;
 use crate::picture::{
@@ -118,6 +119,9 @@ fn decode_unguarded(
         planes.insert(&header, block)
     })?;
     let planes = planes.map_or_else(new, Ok)?;
+    let overflowed = (planes.n_infinite > 0).then(|| {
+        format!("{} infinite values count as {OVERFLOWED} in the means of texels", planes.n_infinite)
+    });
     let image = planes.into_image(matrix);
     let attributes = string_attributes(&header);
     Ok(Picture {
@@ -127,17 +131,18 @@ fn decode_unguarded(
         guessed_layer: selected.guessed,
         attributes,
         notes: notes.into_iter().collect(),
-        warnings: warnings.into_iter().collect(),
+        warnings: warnings.into_iter().chain(overflowed).collect(),
         ..Picture::opaque(image.0, Format::Exr)
     })
 }
 
-/// The width and height of the first part.
+/// The width and height of the largest part.
 pub(in crate::picture) fn size(bytes: &[u8]) -> Result<(usize, usize), PictureErrorKind> {
     guarded(|| {
         let reader = open(bytes)?;
-        let size = reader.headers().first().map(|header| header.layer_size);
-        size.map(|size| (size.0, size.1)).ok_or(PictureErrorKind::NoBytes)
+        let sizes = reader.headers().iter().map(|header| header.layer_size);
+        let largest = sizes.max_by_key(|size| size.area());
+        largest.map(|size| (size.0, size.1)).ok_or(PictureErrorKind::NoBytes)
     })
 }
 
@@ -179,7 +184,7 @@ pub(super) fn for_each_block(
     let meta = chunks.meta_data().clone();
     let (mut found, mut texels) = (HashSet::new(), 0);
     loop {
-        // A single thread needs no more than one block.
+        // A few blocks keep a thread busy.
         let most = BATCH.min(4 * rayon::current_num_threads());
         let batch: Vec<Chunk> =
             chunks.by_ref().take(most).collect::<Result<_, _>>().map_err(PictureErrorKind::Exr)?;
@@ -473,8 +478,10 @@ struct Planes {
     pixels: Vec<Rgb>,
     alpha: Option<Vec<f32>>,
     channels: [Option<usize>; 4],
-    /// Of how the picture is smaller than the file.
+    /// Set if the picture is smaller than the file.
     reduction: Option<Reduction>,
+    /// The number of infinite values that went into means.
+    n_infinite: usize,
 }
 
 impl Planes {
@@ -489,7 +496,7 @@ impl Planes {
         let size = reduction.as_ref().map_or((width, height), |r| (r.width, r.height));
         let pixels = allocate(Rgb::BLACK, size.0, size.1)?;
         let alpha = channels[3].map(|_| allocate(0.0, width, height)).transpose()?;
-        Ok(Self { width, height, pixels, alpha, channels, reduction })
+        Ok(Self { width, height, pixels, alpha, channels, reduction, n_infinite: 0 })
     }
 
     fn insert(
@@ -534,12 +541,16 @@ impl Planes {
         }
     }
 
-    /// Adds what the values of a row from (x, y) on contribute to a smaller picture.
+    /// Adds what the values of a row from (x, y) on contribute to a smaller picture. An infinite value, of a sun that
+    /// overflowed, would make its whole block infinite.
     fn add(&mut self, channel: usize, x: usize, y: usize, values: &[f32]) {
         let Some(Reduction { factor, width, weights, .. }) = &self.reduction else { return };
         let [r, g, b] = [0, 1, 2].map(|i| self.channels[i] == Some(channel));
         let row = &mut self.pixels[y / factor * width..][..*width];
         for (x, &value) in (x..).zip(values) {
+            let is_infinite = value == f32::INFINITY;
+            self.n_infinite += usize::from(is_infinite);
+            let value = if is_infinite { OVERFLOWED } else { value };
             let (pixel, part) = (&mut row[x / factor], weights[y] * value);
             pixel.r += if r { part } else { 0.0 };
             pixel.g += if g { part } else { 0.0 };
