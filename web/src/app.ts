@@ -453,9 +453,9 @@ export class App {
     // Scene files come before the meshes that they name.
     const scenes = paths.filter(isScene).sort((a, b) => Number(/\.toml$/i.test(b)) - Number(/\.toml$/i.test(a))), radiance = paths.filter(isProbe);
     // Pictures dropped with a scene are its textures.
-    const probes = scenes.length || radiance.length ? radiance : paths.filter((path) => /\.(png|jpe?g)$/i.test(path));
+    const probes = scenes.length || radiance.length ? radiance : paths.filter((path) => /\.(ktx2|dds|png|jpe?g)$/i.test(path));
     if (!scenes.length && !probes.length) {
-      this.tell(`${paths[0] ?? "nothing"} is neither a scene (GLB, glTF, OBJ, PLY, STL, OFF, TOML) nor a light probe (HDR, EXR, PFM, PNG, JPEG)`, true);
+      this.tell(`${paths[0] ?? "nothing"} is neither a scene (GLB, glTF, OBJ, PLY, STL, OFF, TOML) nor a light probe (HDR, EXR, PFM, KTX2, DDS, PNG, JPEG)`, true);
       return;
     }
     const contents = await Promise.all(files.map(async ({ path, file }) => ({ path, bytes: new Uint8Array(await file.arrayBuffer()) })));

@@ -6,7 +6,7 @@ import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { close, launch, open, pixelsOf, program, rendered, renderedAnew, slide } from "./page.js";
+import { close, drop, launch, open, pixelsOf, program, rendered, renderedAnew, slide } from "./page.js";
 
 // One for each kind of strategy, and for what differs most within a kind.
 const STRATEGIES = [
@@ -145,10 +145,15 @@ test("light for engines and shaders has the program's bytes", async () => {
     await page.selectOption("#ibl-container", "dds");
     assert.match(await page.$eval("#ibl-command", (pre) => pre.textContent), /--for filament --size 64 --sun clamp:20 --texels half$/);
     await compare("#ibl-files button", "#ibl-command");
+    const cube = join(folder, "studio.dds");
     await page.selectOption("#tables-language", "glsl");
     await page.check("#tables-compensated");
     await compare("#tables-files button", "#tables-command");
     await compare(["json", "tscn", "usda"].map((kind) => `#formats button:has-text('rig.${kind}')`).join(), "#rig-command", "-o", "rig.tscn", "-o", "rig.usda");
+    // The cube is a probe, too.
+    await drop(page, [cube]);
+    await page.waitForFunction(() => document.getElementById("rig-command").textContent.startsWith("domelight lights studio.dds "));
+    assert.deepEqual(await page.evaluate(() => window.domelight.app.probe.size), [256, 128]);
   } finally {
     rmSync(folder, { recursive: true });
   }

@@ -148,7 +148,7 @@ impl Environment {
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
-    ///     A picture: .hdr, .exr, .pfm, .png or .jpg.
+    ///     A picture: .hdr, .exr, .pfm, .ktx2, .dds, .png or .jpg.
     /// rotation, scale, up
     ///     As in the class.
     /// exposure : float, default 0

@@ -90,8 +90,8 @@ pub(crate) struct LightsArguments {
 
 /// `--env` as the first argument.
 pub(super) fn positional(env: clap::Arg) -> clap::Arg {
-    let help = "A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm; - \
-                reads standard input)";
+    let help = "A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm, .ktx2, \
+                .dds; - reads standard input)";
     let env = env.long(None::<&'static str>).index(1).required(true);
     env.help(help).help_heading(None::<&'static str>)
 }

@@ -346,7 +346,7 @@ impl Metric {
 /// Measure, preview and convert a light probe.
 #[derive(Args, Debug)]
 pub(crate) struct ProbeArguments {
-    /// A probe file (.hdr, .exr, .pfm, .png, .jpg; - reads standard input) or sky, studio, cathedral, constant.
+    /// A probe file (.hdr, .exr, .pfm, .ktx2, .dds, .png, .jpg; - reads standard input) or sky, studio, cathedral, constant.
     #[arg(value_name = "FILE|NAME")]
     pub(crate) probe: PathBuf,
     /// Print JSON.

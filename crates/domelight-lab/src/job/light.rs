@@ -24,8 +24,8 @@ use crate::{Error, Host};
 #[command(next_help_heading = "Environment")]
 #[serde(default, deny_unknown_fields)]
 pub struct Light {
-    /// A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm, .png, .jpg;
-    /// - reads standard input) [default: the scene's, otherwise sky]
+    /// A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm, .ktx2, .dds, .png,
+    /// .jpg; - reads standard input) [default: the scene's, otherwise sky]
     #[arg(id = "light.map", long = "env", value_name = "PROBE")]
     pub map: Option<String>,
     /// Program that the scene comes from: the map is oriented as in that program (domelight conventions lists how)

@@ -119,9 +119,9 @@ fn decode_unguarded(
         planes.insert(&header, block)
     })?;
     let planes = planes.map_or_else(new, Ok)?;
-    let overflowed = (planes.n_infinite > 0).then(|| {
-        format!("{} infinite values count as {OVERFLOWED} in the means of texels", planes.n_infinite)
-    });
+    let n = planes.n_infinite;
+    let overflowed =
+        (n > 0).then(|| format!("infinite values in means: {n}, as {OVERFLOWED} each"));
     let image = planes.into_image(matrix);
     let attributes = string_attributes(&header);
     Ok(Picture {
