@@ -2,15 +2,19 @@
 
 use std::env;
 use std::fs;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, anyhow};
+use anyhow::Result;
 use domelight::quote::xml;
 
 use crate::args::page::{FILE, PageArguments};
-use crate::error::status;
+use crate::error::{UsageError, status};
 use crate::files;
 use crate::output::print_json;
+
+/// No page is larger; of another file, no more is read.
+const MAX_BYTES: u64 = 1 << 26;
 
 /// The part of the page before the address that copied links begin with.
 const BASE: &str = "<meta name=\"base\" content=\"";
@@ -24,9 +28,9 @@ pub(crate) fn run(arguments: &PageArguments, quiet: bool) -> Result<()> {
     files::reads(&source)?;
     files::writes(&arguments.output)?;
     let name = source.display().to_string();
-    let page = fs::read_to_string(&source).with_context(|| name.clone())?;
+    let page = read(&source).map_err(|error| UsageError(format!("{name}: {error}")))?;
     let page = with_base(&page, arguments.base.as_deref())
-        .ok_or_else(|| anyhow!("{name}: this is not the page of domelight"))?;
+        .ok_or_else(|| UsageError(format!("{name}: this is not the page of domelight")))?;
     files::write(&arguments.output, |out| out.write_all(page.as_bytes()))?;
     if arguments.json {
         let file = arguments.output.display().to_string();
@@ -36,6 +40,12 @@ pub(crate) fn run(arguments: &PageArguments, quiet: bool) -> Result<()> {
         status(&format!("-> {}: open it in a browser", arguments.output.display()));
     }
     Ok(())
+}
+
+fn read(source: &Path) -> io::Result<String> {
+    let mut page = String::new();
+    fs::File::open(source)?.take(MAX_BYTES).read_to_string(&mut page)?;
+    Ok(page)
 }
 
 /// Where the page may be: beside the program, in the folder of data that belongs to the program's, or, in a checkout, where
@@ -53,16 +63,14 @@ fn installed() -> Result<PathBuf> {
     let program = env::current_exe().and_then(fs::canonicalize)?;
     let places = places(&program);
     let missing = || {
-        let [beside, shared] = [0, 1].map(|i| places.get(i).map(|place| place.display()));
-        let looked: Vec<_> =
-            [beside, shared].into_iter().flatten().map(|p| p.to_string()).collect();
-        anyhow!(
+        let looked: Vec<_> = places.iter().take(2).map(|p| p.display().to_string()).collect();
+        UsageError(format!(
             "the page is at neither {}: take {FILE} from an archive of the release, or make it with web/build in a checkout, \
              and name it with --from",
             looked.join(" nor ")
-        )
+        ))
     };
-    places.iter().find(|place| place.is_file()).cloned().ok_or_else(missing)
+    Ok(places.iter().find(|place| place.is_file()).cloned().ok_or_else(missing)?)
 }
 
 /// The page with another address for copied links; `None` if it has no place for it.

@@ -32,7 +32,7 @@ fn what_is_no_page_is_refused() {
         assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
         assert!(stderr(&output).contains(what), "{}", stderr(&output));
     };
-    fails(&["--from", "other.html"], 1, "other.html: this is not the page of domelight");
+    fails(&["--from", "other.html"], 2, "other.html: this is not the page of domelight");
     fails(&["--from", "missing.html"], 2, "missing.html");
     fails(&["--from", "other.html", "-o", "other.html"], 2, "other.html");
     fails(&["--base", "example.org"], 2, "it must begin with https:// or http://");
