@@ -1,6 +1,7 @@
 // The page: unpacks the engine, creates the panels, and accepts dropped files.
 
 import { App } from "./app";
+import { Direction } from "./direction";
 import { $ } from "./dom";
 import { EngineLight } from "./engine_light";
 import { Engines } from "./engines";
@@ -34,8 +35,8 @@ async function main() {
   if (new URLSearchParams(location.search).get("embed") === "step") document.documentElement.dataset.embed = "step";
   const app = new App(await Engines.create());
   const picture = new PicturePanel(app);
-  const map = new MapPanel(app);
-  new XrayPanel(app);
+  const direction = new Direction(app), map = new MapPanel(app, direction);
+  new XrayPanel(app, direction);
   new LightsPanel(app);
   new EngineLight(app);
   const lecture = new Lecture(app);

@@ -1,8 +1,9 @@
 // The Map panel: the probe in any mapping, and how the picked pixel samples it.
 
 import type { App, Change } from "./app";
+import { colorBar, mark, placeOf, type Direction } from "./direction";
 import { $, degrees, fill, h, latest, short, stops } from "./dom";
-import { Film, FilmView } from "./film";
+import { Film, FilmView, luminance } from "./film";
 import type { MapPicture } from "./protocol";
 import { MAPPINGS } from "./state";
 
@@ -34,7 +35,10 @@ export class MapPanel {
   private outline: Float32Array | null = null;
   private sunOf = "";
 
-  constructor(private app: App) {
+  private showMark: (place: [number, number] | null) => void;
+
+  constructor(private app: App, private direction: Direction) {
+    this.showMark = mark($("map-viewer"));
     fill($("mapping"), MAPPINGS, app.state.mapping);
     app.on((what) => this.changed(what));
     const rotate = (value: number) => {
@@ -59,9 +63,10 @@ export class MapPanel {
     viewer.addEventListener("pointerdown", (event) => {
       viewer.setPointerCapture(event.pointerId);
       last = event.clientX;
+      this.point(placeOf(event, viewer));
     });
     viewer.addEventListener("pointermove", (event) => {
-      if (last === null) return;
+      if (last === null) return this.point(placeOf(event, viewer));
       const turn = (event.clientX - last) / viewer.clientWidth * 360;
       if (Math.abs(turn) < 0.5) return;
       last = event.clientX;
@@ -137,6 +142,42 @@ export class MapPanel {
     $("map-caption").textContent = `${app.envName}, ${size[0]} × ${size[1]} texels, rotated by ${degrees(state.rotate)}; ${this.sun ? `${state.env === "sky" ? "the sun" : "the brightest compact light"} is outlined` : "no compact light found"}.`;
     this.mark();
     document.documentElement.dataset.map = key;
+    this.follow();
+  }
+
+  /** Points at a direction, whose values are then shown. */
+  private point(place: [number, number]) {
+    this.direction.point(this.app.state.mapping, place);
+    this.showAt(place);
+  }
+
+  /** Shows the direction that was pointed at, here or in the X-ray panel. */
+  private readonly follow = latest(async () => {
+    try {
+      this.showAt((await this.direction.places(this.app.state.mapping))?.map ?? null);
+    } catch (error) {
+      this.app.tell((error as Error).message, true);
+    }
+  });
+
+  private showAt(place: [number, number] | null) {
+    const values = place && this.values(place);
+    this.showMark(values ? place : null);
+    $("map-readout").textContent = values;
+  }
+
+  /** What is known of the direction at a place; null beside the layout's picture. */
+  private values([u, v]: [number, number]): string | null {
+    const film = this.view.films[0], { layers, counted } = this;
+    const at = ({ width, height }: { width: number; height: number }) => Math.floor(v * height) * width + Math.floor(u * width);
+    if (!film || !film.pixels[4 * at(film) + 3]) return null;
+    if (!layers?.pixels.length) return `In this direction, L = ${short(luminance(film.pixels, 4 * at(film)))}.`;
+    const [light, reflectance, visibility, ofLight, ofLobe, ofBoth, product] = IMPORTANCE.map((_, k) => layers.pixels[k * layers.width * layers.height + at(layers)]);
+    const strategy = this.countedStrategy, { layer } = this.app.state;
+    const ofRays = strategy && counted?.density.pixels.length ? counted.density.pixels[at(counted.density)] : undefined;
+    const chosen = ofRays ?? { environment: ofLight, brdf: ofLobe, mis: ofBoth, target: product }[layer];
+    const weight = chosen ? ` The weight f · cos θ · L / p of a sample is ${short(reflectance * light / chosen)} there.` : "";
+    return `In this direction, L = ${short(light)}, f · cos θ = ${short(reflectance)}, V = ${short(visibility)}; densities: environment ${short(ofLight)}, BRDF ${short(ofLobe)}, half of each ${short(ofBoth)}, product ${short(product)}${ofRays === undefined ? "" : `, ${strategy} ${short(ofRays)}`} per steradian.${weight}`;
   }
 
   /** Requests the pixel's layers, samples and radiance. */
@@ -182,6 +223,7 @@ export class MapPanel {
     const [what, unit] = INTEGRALS[layer] ?? ["p", ""];
     const found = integral === undefined ? this.found : [...this.found, [`The overlay’s integral, ∫ ${what} dω`, `${Number(integral.toPrecision(3)).toFixed(2)}${unit}`]];
     $("point-table").querySelector("tbody")!.replaceChildren(...found.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value))));
+    this.follow();
     // Another request may still count the layer's rays.
     if (!layer || this.layer()) document.documentElement.dataset.layer = `${layer} ${mapping}`;
   }
@@ -258,9 +300,12 @@ export class MapPanel {
    *  of the map, because otherwise a sun would make everything else invisible. */
   private heat(context: CanvasRenderingContext2D) {
     const layer = this.layer();
+    $("map-bar").hidden = !layer?.values.length;
     if (!layer?.values.length) return;
     const { values, width, height } = layer, sorted = values.filter((value) => value > 0).sort();
     const most = sorted[Math.floor(0.99 * (sorted.length - 1))] ?? 0;
+    const { selectedOptions: [chosen] } = $<HTMLSelectElement>("layer"), unit = this.app.state.layer === "visibility" ? "" : " sr⁻¹";
+    colorBar($("map-bar"), `The overlay, ${chosen.textContent}`, "linear-gradient(to right, transparent, rgb(255 64 160 / 0.92)), #000", [[0, "0"], [0.5, short(most / 4)], [1, `${short(most)}${unit}${most < 1 || unit ? " or more" : ""}`]]);
     const image = new ImageData(width, height);
     values.forEach((value, i) => image.data.set([255, 64, 160, most > 0 ? 235 * Math.sqrt(Math.min(value / most, 1)) : 0], 4 * i));
     const small = h("canvas", { width: String(width), height: String(height) });

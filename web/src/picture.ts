@@ -1,11 +1,12 @@
 // The Picture panel: the progressive picture, its camera, material, strategies and cost.
 
 import type { App, Change } from "./app";
+import { colorBar, placeOf } from "./direction";
 import { $, color, count, degrees, fill, save, short, signed, stops, words } from "./dom";
 import { strategyEditor } from "./editors";
 import type { Camera, Host, Job, RenderSettings } from "./engines";
 import { ErrorPlot, type Measured } from "./errors";
-import { Film, FilmView } from "./film";
+import { Film, FilmView, luminance } from "./film";
 import { onFigureWidth } from "./plot";
 import type { Update } from "./protocol";
 import { MaterialControls } from "./materials";
@@ -69,6 +70,9 @@ export class PicturePanel {
     this.reference = new Reference(app, () => this.referenceChanged(), () => this.isReferred());
     this.materials = new MaterialControls(app);
     app.on((what) => this.changed(what));
+    // From full color to black at an error of 2⁻⁸, as the view has it.
+    const errors: [number, string][] = [[0, "−100 %"], [0.25, "−6 %"], [0.5, "0.4 % or less"], [0.75, "6 %"], [1, "100 %"]];
+    colorBar($("error-bar"), "Relative error", "linear-gradient(to right, rgb(89 166 255), rgb(13 13 13), rgb(255 140 38))", errors);
     this.wireControls();
     this.wireCamera();
     this.wireDivider();
@@ -251,11 +255,11 @@ export class PicturePanel {
   /** Shows the error under the picture. */
   private tellError() {
     const { reference } = this, legend = $("error-legend");
-    legend.hidden = this.app.state.view !== "error";
+    legend.hidden = $("error-bar").hidden = this.app.state.view !== "error";
     if (legend.hidden) return;
     if (reference.failure) legend.textContent = `There is no reference: ${reference.failure}.`;
     else if (!reference.film) legend.textContent = "Rendering a reference …";
-    else legend.textContent = `Blue pixels are too dark, orange pixels too bright. Full color means an error of 100 %, black 0.4 % or less. The reference has ${reference.samples} samples per pixel.`;
+    else legend.textContent = `Blue pixels are too dark, orange pixels too bright. The reference has ${reference.samples} samples per pixel.`;
   }
 
   private calibrated = false;
@@ -457,7 +461,7 @@ export class PicturePanel {
     });
     viewer.addEventListener("pointermove", (event) => {
       const last = pointers.get(event.pointerId);
-      if (!last) return;
+      if (!last) return this.read(placeOf(event, viewer));
       const dx = event.clientX - last.x, dy = event.clientY - last.y;
       moved += Math.abs(dx) + Math.abs(dy);
       if (pointers.size === 2) {
@@ -478,6 +482,7 @@ export class PicturePanel {
     };
     viewer.addEventListener("pointerup", end);
     viewer.addEventListener("pointercancel", end);
+    viewer.addEventListener("pointerleave", () => this.read(null));
     viewer.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.orbit(0, 0, Math.exp(Math.min(Math.max(event.deltaY, -100), 100) * 0.002));
@@ -493,6 +498,21 @@ export class PicturePanel {
       event.preventDefault();
       this.orbit(...move);
     });
+  }
+
+  /** Shows the values of the pixel under the pointer. */
+  private read(place: [number, number] | null) {
+    const [left, right, reference] = this.view.films, film = right && place && place[0] >= this.view.look.divider ? right : left;
+    if (!film || !place) {
+      $("pixel-readout").textContent = "";
+      return;
+    }
+    const x = Math.floor(place[0] * film.width), y = Math.floor(place[1] * film.height), at = 4 * (y * film.width + x);
+    const rgb = [...film.pixels.subarray(at, at + 3)], value = luminance(film.pixels, at);
+    const truth = this.view.look.errors && reference?.width === film.width ? luminance(reference.pixels, at) : 0;
+    const error = truth > 0 ? `; its error is ${short(100 * (value / truth - 1))} % of the reference’s ${short(truth)}` : "";
+    $("pixel-readout").classList.toggle("above", place[1] > 0.8);
+    $("pixel-readout").textContent = `Column ${x}, row ${y}: R, G, B ${rgb.map(short).join(", ")}; luminance ${short(value)}${error}.`;
   }
 
   private pick(event: PointerEvent) {

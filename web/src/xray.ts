@@ -1,8 +1,9 @@
 // The X-ray panel: the hemisphere above a pixel, the rays of each strategy, and the causes of noise.
 
 import type { App, Change } from "./app";
+import { colorBar, mark, placeOf, type Direction } from "./direction";
 import { $, color, h, latest, percentage, short } from "./dom";
-import { Film, FilmView } from "./film";
+import { Film, FilmView, luminance } from "./film";
 import { explain } from "./glossary";
 
 const SIZE = 160, DENSITY = 48;
@@ -22,16 +23,67 @@ const percent = (x: number) => `${short(100 * x)} %`;
 
 export class XrayPanel {
   private views: FilmView[] = [];
+  private map = new FilmView($<HTMLCanvasElement>("xray-map-film"), false);
+  private marks: ((place: [number, number] | null) => void)[];
+  private markMap: (place: [number, number] | null) => void;
+  /** The maps of the hemisphere, and the rays of each strategy with its mark. */
+  private maps: Float32Array = new Float32Array();
+  private rays: { name: string; density: Float32Array; mark: (place: [number, number] | null) => void }[] = [];
 
-  constructor(private app: App) {
+  constructor(private app: App, private direction: Direction) {
     app.on((what) => this.changed(what));
     this.fillCompared();
     new PixelPicker(app);
-    $("hemispheres").replaceChildren(...LAYERS.map((name) => {
+    const hemispheres = LAYERS.map((name) => {
       const canvas = h("canvas", { width: String(SIZE), height: String(SIZE), role: "img", "aria-label": `Hemisphere: ${name}` });
       this.views.push(new FilmView(canvas, false));
-      return h("figure", {}, canvas, h("figcaption", {}, name));
-    }));
+      return { marked: this.touchable(canvas), name };
+    });
+    this.marks = hemispheres.map(({ marked }) => mark(marked));
+    $("hemispheres").replaceChildren(...hemispheres.map(({ marked, name }) => h("figure", {}, marked, h("figcaption", {}, name))));
+    const map = $("xray-map").querySelector<HTMLElement>(".marked")!;
+    this.markMap = mark(map);
+    for (const event of ["pointerdown", "pointermove"] as const) map.addEventListener(event, (event) => this.point("lat-long", placeOf(event, map)));
+  }
+
+  /** A picture of the hemisphere that is pointed at. */
+  private touchable(canvas: HTMLCanvasElement): HTMLElement {
+    const marked = h("div", { class: "marked" }, canvas);
+    for (const event of ["pointerdown", "pointermove"] as const) marked.addEventListener(event, (event) => {
+      const [u, v] = placeOf(event, marked);
+      this.point("hemisphere", [2 * u - 1, 1 - 2 * v]);
+    });
+    return marked;
+  }
+
+  private point(from: string, at: [number, number]) {
+    if (from === "hemisphere" && Math.hypot(...at) >= 1) return;
+    this.direction.point(from, at);
+    this.follow();
+  }
+
+  /** Marks the direction that was pointed at, here or in the Map panel, in all pictures, and reads their values. */
+  private readonly follow = latest(async () => {
+    try {
+      const places = await this.direction.places("lat-long"), above = places?.hemisphere;
+      const place: [number, number] | null = above ? [0.5 + 0.5 * above[0], 0.5 - 0.5 * above[1]] : null;
+      for (const show of [...this.marks, ...this.rays.map(({ mark }) => mark)]) show(place);
+      this.markMap(places?.map ?? null);
+      $("xray-readout").textContent = place ? this.values(place) : places ? "This direction is below the surface." : "";
+    } catch (error) {
+      this.app.tell((error as Error).message, true);
+    }
+  });
+
+  private values([u, v]: [number, number]): string {
+    const at = (n: number) => Math.min(Math.floor(v * n), n - 1) * n + Math.min(Math.floor(u * n), n - 1);
+    const of = (layer: number) => this.maps.subarray(3 * (layer * SIZE * SIZE + at(SIZE))).slice(0, 3);
+    const [light, reflectance, visibility, product] = LAYERS.map((_, layer) => of(layer)), unoccluded = luminance(light.map((l, i) => l * reflectance[i]), 0);
+    const rays = this.rays.map(({ name, density }) => {
+      const p = density[at(DENSITY)];
+      return `${name} ${short(p)}${p > 0 ? `, weight ${short(unoccluded / p)}` : ""}`;
+    });
+    return `In this direction, L = ${short(luminance(light, 0))}, f · cos θ = ${short(luminance(reflectance, 0))}, V = ${short(visibility[0])}, their product ${short(luminance(product, 0))}. Counted rays per steradian, and the weights f · cos θ · L / p: ${rays.join("; ")}.`;
   }
 
   /** The strategies compared with the picture's. */
@@ -72,12 +124,16 @@ export class XrayPanel {
       const { pixel: [x, y], coverage } = report.summary;
       $("xray-summary").textContent = `Pixel ${x}, ${y} of ${app.state.size} × ${app.state.size}: ${percent(coverage)} of its camera samples show the scene.`;
       $("xray-advice").textContent = sentence(report.advice);
-      $("hemispheres").hidden = $("directions").hidden = !maps.length;
+      $("hemispheres").hidden = $("directions").hidden = $("xray-map").hidden = !maps.length;
+      this.maps = maps;
       if (maps.length) this.paint(maps);
+      await this.paintMap();
       const densities: Float32Array[] = [];
       for (const { name } of report.strategies) densities.push((await app.engines.call("directions", settings([name]), DENSITY)) as Float32Array);
+      this.rays = [];
       $("densities").replaceChildren(...report.strategies.flatMap((strategy, i) => (densities[i].length ? [this.density(strategy, densities[i])] : [])));
       this.tell(report);
+      this.follow();
     } catch (error) {
       app.tell((error as Error).message, true);
     }
@@ -93,6 +149,14 @@ export class XrayPanel {
       view.set({ exposure: i === 2 ? 0 : film.exposure() + (i === 3 ? 1 : 0), curve: i === 2 ? "standard" : "agx" });
       view.show(0, film);
     });
+  }
+
+  private async paintMap() {
+    const { width, height, pixels } = await this.app.engines.call("mapView", "lat-long", this.app.state.rotate, $<HTMLCanvasElement>("xray-map-film").width);
+    const film = new Film(width, height);
+    film.pixels = pixels;
+    this.map.set({ exposure: film.exposure(), curve: "agx" });
+    this.map.show(0, film);
   }
 
   private density(strategy: Report["strategies"][0], density: Float32Array) {
@@ -117,7 +181,10 @@ export class XrayPanel {
         context.fill();
       }
     }
-    return h("figure", {}, canvas, h("figcaption", {}, strategy.name));
+    const marked = this.touchable(canvas), bar = h("div");
+    this.rays.push({ name: strategy.name, density, mark: mark(marked) });
+    colorBar(bar, `Rays of ${strategy.name}`, "linear-gradient(to right, transparent, rgb(255 96 176)), #000", [[0, "0"], [1, `${short(most)} sr⁻¹ or more`]]);
+    return h("figure", {}, marked, bar, h("figcaption", {}, strategy.name));
   }
 
   private tell(report: Report) {

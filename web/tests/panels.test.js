@@ -187,6 +187,7 @@ test("the error view measures the picture against a reference", async () => {
   const { page, done } = await open("size=32&spp=32&rows=64&env=studio&strategy=mis:1:1&beside=product:8&view=error");
   await rendered(page);
   await page.waitForFunction(() => /The reference has \d+ samples/.test(document.getElementById("error-legend").textContent));
+  assert.ok(await page.isVisible("#error-bar"));
   await page.waitForFunction(() => window.domelight.picture.reference.renders >= 8 || !window.domelight.picture.reference.running);
   const sides = await page.evaluate(() => {
     const { picture } = window.domelight;
@@ -436,6 +437,56 @@ test("where there are no lights, the panel says why and offers nothing", async (
   await page.evaluate(() => window.domelight.app.set({ env: "sky", sun: false, leave: false }));
   await page.waitForSelector("html[data-rig='variance-minimization:64']");
   assert.ok(await page.locator("#formats button").count() > 5);
+  await done();
+});
+
+test("a direction under the pointer is read, and marked alike on the map and the hemispheres", async () => {
+  const { page, done } = await open(`${SMALL}&pixel=[27,27]&panel=map&strategy=mis:1:1&layer=environment`, { reducedMotion: "reduce" });
+  await page.waitForSelector("html[data-samples]");
+  const over = async (selector, u, v) => {
+    const box = await page.locator(selector).first().boundingBox();
+    await page.mouse.move(box.x + u * box.width, box.y + v * box.height);
+  };
+  const numbers = (text) => [/L = ([\d.]+)/, /f · cos θ = ([\d.]+)/, /V = ([\d.]+)/, /environment ([\d.]+)/].map((number) => Number(number.exec(text)?.[1]));
+  const places = (selector) => page.$$eval(selector, (marks) => marks.map(({ hidden, style }) => (hidden ? null : [style.left, style.top].map((share) => Math.round(parseFloat(share))))));
+  await over("#map-viewer", 0.7, 0.4);
+  await page.waitForFunction(() => /^In this direction, L = .*, V = .*; densities: environment .* per steradian\. The weight .* there\.$/.test(document.getElementById("map-readout").textContent));
+  const read = await text(page, "#map-readout"), first = numbers(read);
+  assert.deepEqual(await places("#map-viewer .mark"), [[70, 40]]);
+  assert.match(await page.getAttribute("#map-bar", "aria-label"), /^The overlay, environment: 0, [\d.]+, [\d.]+ sr⁻¹ or more$/);
+  // The light's density is in proportion to the light.
+  await over("#map-viewer", 0.7, 0.1);
+  await page.waitForFunction((before) => document.getElementById("map-readout").textContent !== before, read);
+  const second = numbers(await text(page, "#map-readout"));
+  assert.ok(Math.abs(first[0] / first[3] / (second[0] / second[3]) - 1) < 0.02, `${first} and ${second}`);
+  // The X-ray panel marks the same direction and reads the same values.
+  await show(page, "xray");
+  await page.waitForFunction(() => /^In this direction, L = .* Counted rays per steradian, .*: .*, weight /.test(document.getElementById("xray-readout").textContent));
+  const above = numbers(await text(page, "#xray-readout"));
+  for (const i of [0, 1, 2]) assert.ok(Math.abs(above[i] - second[i]) <= 0.1 * second[i], `${above} in the X-ray panel, ${second} on the map`);
+  assert.deepEqual(await places("#xray-map .mark"), [[70, 10]]);
+  // All hemispheres mark what is pointed at in one, and so does the map.
+  await over("#hemispheres .marked", 0.5, 0.5);
+  await page.waitForFunction(() => document.querySelector("#hemispheres .mark").style.left === "50%");
+  const marks = await places(".hemispheres .mark");
+  assert.ok(marks.length > 4 && marks.every((place) => place?.join() === "50,50"), JSON.stringify(marks));
+  const normal = await places("#xray-map .mark");
+  await show(page, "map");
+  await page.waitForFunction((place) => Math.round(parseFloat(document.querySelector("#map-viewer .mark").style.left)) === place, normal[0][0]);
+  assert.deepEqual(await places("#map-viewer .mark"), normal);
+  // So are the values of a pixel of the picture.
+  await show(page, "picture");
+  await rendered(page);
+  await over("#viewer", 0.5078, 0.3047);
+  await page.waitForFunction(() => /^Column 32, row 19: R, G, B .*; luminance /.test(document.getElementById("pixel-readout").textContent));
+  const luminance = await page.evaluate(() => {
+    const { pixels } = window.domelight.picture.films[0], [r, g, b] = pixels.subarray(4 * (19 * 64 + 32));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  });
+  const stated = await text(page, "#pixel-readout");
+  assert.ok(Math.abs(Number(/luminance ([\d.]*\d)/.exec(stated)[1]) / luminance - 1) < 0.01, `${stated} for ${luminance}`);
+  // A finger scrolls the page where nothing is dragged in its direction.
+  assert.deepEqual(await page.$$eval("#viewer, #map-viewer, #xray-viewer, #lights .viewer", (all) => all.map((viewer) => getComputedStyle(viewer).touchAction)), ["none", "pan-y", "auto", "auto"]);
   await done();
 });
 

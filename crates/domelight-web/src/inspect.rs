@@ -2,6 +2,7 @@
 
 use domelight::Rgb;
 use domelight::inspect::{Decomposition, DirectionSample, Inspector, PixelSummary, advice};
+use domelight::math::Vec3;
 use domelight::render::RenderSettings;
 use domelight::scene::Camera;
 use domelight::strategy::{PreparedStrategy, StrategySpec};
@@ -68,6 +69,16 @@ impl Engine {
         let inspector = Inspector::new(scene, &camera, environment, &settings, pixel)
             .map_err(|e| JsError::new(&e.to_string()))?;
         f(&inspector, &state)
+    }
+
+    /// The axes of the maps of the hemisphere above a pixel: to the right, to the top, and the normal. `None` where the pixel
+    /// shows no surface.
+    ///
+    /// # Errors
+    /// As [`Engine::inspect`].
+    pub(crate) fn axes(&self, json: &str) -> Result<Option<[Vec3; 3]>, JsError> {
+        let frame = self.inspected(json, |inspector, _| Ok(inspector.hemisphere(1)))?;
+        Ok(frame.map(|maps| maps.frame.map(Vec3::from_array)))
     }
 }
 

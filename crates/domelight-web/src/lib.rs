@@ -3,6 +3,7 @@
 //! Settings come as JSON, results as JSON or as arrays of numbers; nothing is read but what the page gives. Errors are
 //! the library's own sentences.
 
+mod direction;
 mod files;
 mod inspect;
 mod lights;

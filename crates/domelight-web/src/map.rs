@@ -90,7 +90,7 @@ fn size(mapping: Mapping, width: usize) -> (usize, usize) {
     mapping.size_of([width, width / 2])
 }
 
-fn mapping_of(name: &str) -> Result<Mapping, JsError> {
+pub(crate) fn mapping_of(name: &str) -> Result<Mapping, JsError> {
     name.parse().map_err(|e: UnknownMapping| JsError::new(&e.to_string()))
 }
 
