@@ -1,5 +1,16 @@
 //! Parallel loops whose result does not depend on the number of threads.
 
+/// The number of threads of these loops.
+#[cfg(feature = "picture")]
+pub(crate) fn threads() -> usize {
+    #[cfg(feature = "render")]
+    {
+        rayon::current_num_threads()
+    }
+    #[cfg(not(feature = "render"))]
+    1
+}
+
 /// `f(0)`, …, `f(n − 1)`, in parallel with the feature `render`.
 pub(crate) fn in_order<R: Send>(n: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
     #[cfg(feature = "render")]

@@ -63,18 +63,16 @@ pub(super) fn decode_reduced(bytes: &[u8], factor: usize) -> Result<Picture, Pic
     let starts = scanline_starts(bytes, &header)?;
     let color = ColorTable::new(&header);
     let mut pixels = allocate(Rgb::BLACK, reduction.width, reduction.height)?;
-    pixels.par_chunks_exact_mut(reduction.width).enumerate().for_each_init(
-        || vec![[0u8; 4]; header.length],
-        |rgbe, (y, row)| {
-            for line in y * factor..(y + 1) * factor {
-                decode_scanline(&bytes[starts[line]..], rgbe);
-                for (pixel, block) in row.iter_mut().zip(rgbe.chunks_exact(factor)) {
-                    let colors = block.iter().map(|&rgbe| color.decode(rgbe));
-                    colors.for_each(|color| *pixel += reduction.weights[line] * color);
-                }
+    bands(&mut pixels, reduction.width, |y, row| {
+        let mut rgbe = vec![[0u8; 4]; header.length];
+        for line in y * factor..(y + 1) * factor {
+            decode_scanline(&bytes[starts[line]..], &mut rgbe);
+            for (pixel, block) in row.iter_mut().zip(rgbe.chunks_exact(factor)) {
+                let colors = block.iter().map(|&rgbe| color.decode(rgbe));
+                colors.for_each(|color| *pixel += reduction.weights[line] * color);
             }
-        },
-    );
+        }
+    });
     let image = RgbImage::new(reduction.width, reduction.height, pixels);
     let (notes, fisheye) = (header.notes(), header.fisheye);
     let picture = Picture::opaque(image, Format::Hdr);

@@ -185,7 +185,7 @@ pub(super) fn for_each_block(
     let (mut found, mut texels) = (HashSet::new(), 0);
     loop {
         // A few blocks keep a thread busy.
-        let most = BATCH.min(4 * rayon::current_num_threads());
+        let most = BATCH.min(4 * parallel::threads());
         let batch: Vec<Chunk> =
             chunks.by_ref().take(most).collect::<Result<_, _>>().map_err(PictureErrorKind::Exr)?;
         if batch.is_empty() {
