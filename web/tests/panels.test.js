@@ -801,6 +801,24 @@ for (const step of [14, 15]) {
   });
 }
 
+test("step 15 divides the map by the rule of 2009, too", async () => {
+  const { page, done } = await open(LECTURE);
+  await showStep(page, 15);
+  await settled(page);
+  const before = await figureOf(page);
+  await page.selectOption("#figure select >> nth=1", "2009");
+  await settled(page);
+  assert.notEqual(await figureOf(page), before);
+  const errors = await page.evaluate(async () => {
+    const rig = (method) => window.domelight.app.engines.call("lights", JSON.stringify({ method, refine: false, n: 16, sun: false, lamps: 0 }));
+    return [await rig("variance-minimization:2009"), await rig("median-cut")].map((json) => JSON.parse(json).diffuse);
+  });
+  const stated = /shading error is ([\d.]+)\s% matte .* with median cut, ([\d.]+)\s%/.exec(await text(page, "#figure .result"));
+  errors.forEach((error, i) => assert.ok(Math.abs(Number(stated[i + 1]) / (100 * error) - 1) < 0.01, `${stated[i + 1]} % for ${error}`));
+  assert.match(await text(page, "#figure .spheres"), /the rule of 2009: error/);
+  await done();
+});
+
 test("the answer of step 12 is what its figure shows, with the repeats' standard errors", async () => {
   const { page, done } = await open(`${LECTURE}&step=12&figure=counts;0;2`);
   await drawn(page, 1);

@@ -134,7 +134,9 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
   const isMinimized = method === "variance-minimization";
   const rounds = stage.player("Lights", 0, 9, 4, (k) => String(2 ** k));
   const shown = stage.choice("Show", [["map", "regions on the map"], ["lights", "the lights alone"], ...(isBuiltinProbe(stage.app.state.env) ? [["pictures", "pictures under the lights"] as [string, string]] : [])]);
-  const refined = isMinimized ? stage.choice("Regions", [["refined", "joined and moved"], ["rectangles", "rectangles"]]) : () => "refined";
+  const refined = isMinimized ? stage.choice("Regions", [["refined", "joined and moved"], ["rectangles", "rectangles"], ["2009", "rectangles, by the rule of 2009"]]) : () => "refined";
+  /** The method with its rule, and its name. */
+  const own = (): [string, string] => (refined() === "2009" ? [`${method}:2009`, "the rule of 2009"] : [method, NAMES[method]]);
   const by = stage.choice("Cut", [["method", `by ${NAMES[method]}`], ["hand", "once, by hand"]]);
   const hand = stage.slider("Cut at", 0.05, 0.95, 0.005, 0.6);
   let map: SmallMap | null = null, held: { texel: number } | null = null, first: FirstCut | null = null, spheres: Spheres | null = null;
@@ -156,8 +158,8 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
       const both = isMinimized ? (await engines.call("spheres", settings(name), SPHERE, 0)) as Float32Array : new Float32Array(), size = both.length / 2;
       return [rig, size ? [0, 1].map((k) => Film.fromRgb(SPHERE, SPHERE, both.subarray(k * size, (k + 1) * size))) : []];
     };
-    const [beside, besideFilms] = await ask(other), [rig, films] = await ask(method);
-    const regions = (await engines.call("regions", settings(method), WIDTH)) as Uint32Array;
+    const [rule] = own(), [beside, besideFilms] = await ask(other), [rig, films] = await ask(rule);
+    const regions = (await engines.call("regions", settings(rule), WIDTH)) as Uint32Array;
     return (known = { key, rig, beside, regions, films: [...films, ...besideFilms.slice(1)] });
   };
   const drawHand = (map: SmallMap) => {
@@ -214,7 +216,7 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
     const drawing: HTMLElement[] = [context.canvas as HTMLCanvasElement];
     if (isMinimized) {
       spheres ??= new Spheres(["the probe", "variance minimization", "median cut"]);
-      spheres.show(films, ["the whole probe", `${NAMES[method]}: error ${percent(rig.diffuse)}`, `${NAMES[other]}: ${percent(beside.diffuse)}`]);
+      spheres.show(films, ["the whole probe", `${own()[1]}: error ${percent(rig.diffuse)}`, `${NAMES[other]}: ${percent(beside.diffuse)}`]);
       drawing.push(spheres.element);
     }
     stage.drawing.replaceChildren(...drawing);
@@ -224,7 +226,7 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
     stage.read(chosen < 0 ? null : `${over ? `${map.read([over.x, over.y])}; its` : "The"} region holds ${percent(map.share((i) => place(i) === chosen))} of the light in ${percent(area)} of the directions.`);
     const brightest = near.count > 1 ? `the ${near.count} lights within 2° of the brightest hold` : "the brightest holds";
     stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}; ${brightest} ${percent(near.share)} of its energy. The shading error is ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; with ${NAMES[other]}, ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
-    if (isMinimized) stage.answer(answerOf(n, rig, beside, stage.app.envName));
+    if (isMinimized) stage.answer(answerOf(n, rig, beside, stage.app.envName, own()[1]));
   });
 };
 
@@ -250,8 +252,8 @@ function drawLights(context: CanvasRenderingContext2D, lights: Light[]) {
 }
 
 /** Which method has the smaller shading error, as the figure shows it. */
-function answerOf(n: number, minimized: Rig, cut: Rig, map: string): string {
+function answerOf(n: number, minimized: Rig, cut: Rig, map: string, minimizing: string): string {
   const compare = (name: string, a: number, b: number) =>
-    a === b ? `${name}, both are alike` : `${name}, ${a < b ? "variance minimization" : "median cut"} has ${short(Number((Math.max(a, b) / Math.max(Math.min(a, b), 1e-9)).toPrecision(2)))} times less`;
+    a === b ? `${name}, both are alike` : `${name}, ${a < b ? minimizing : "median cut"} has ${short(Number((Math.max(a, b) / Math.max(Math.min(a, b), 1e-9)).toPrecision(2)))} times less`;
   return `With ${n} light${n > 1 ? "s" : ""} of ${map}: ${compare("matte", minimized.diffuse, cut.diffuse)}; ${compare("glossy", minimized.glossy, cut.glossy)}. On a map without small bright lights the difference is smaller.`;
 }
