@@ -1,5 +1,6 @@
 // The Workers, one engine each.
 
+import { whileBusy } from "./busy";
 import { Passes } from "./passes";
 import type { Arguments, Call, FromWorker, Result, Statistics, ToWorker, Update } from "./protocol";
 
@@ -94,10 +95,10 @@ export class Host {
 
   call<C extends Call>(call: C, ...args: Arguments<C>): Promise<Result<C>> {
     const id = this.nextId++;
-    return new Promise((resolve, reject) => {
+    return whileBusy(new Promise((resolve, reject) => {
       this.waiting.set(id, { resolve, reject });
       this.send({ kind: "call", id, call, args });
-    });
+    }));
   }
 }
 

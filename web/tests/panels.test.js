@@ -358,6 +358,18 @@ test("one material of a model is chosen in the picture and changed alone", async
   await done();
 });
 
+test("a sign says that the page works, until it is done", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lights`);
+  await page.waitForSelector("#ibl-files button");
+  await page.waitForSelector("#busy", { state: "hidden" });
+  await page.selectOption("#ibl-size", "64");
+  await page.click("#ibl-files button");
+  await page.waitForSelector("#busy", { state: "visible" });
+  await page.waitForFunction(() => /is saved/.test(document.getElementById("status").textContent));
+  await page.waitForSelector("#busy", { state: "hidden" });
+  await done();
+});
+
 test("lights: regions, files of every format, and what is left", async () => {
   const { page, done } = await open(SMALL);
   await show(page, "lights");
