@@ -1,8 +1,9 @@
 // The Lights panel: a probe as a rig, with its regions, its shading and its files.
 
 import type { App, Change } from "./app";
+import { mark, placeOf } from "./direction";
 import { $, degrees, h, latest, percentage, save, short, words } from "./dom";
-import { Film, FilmView } from "./film";
+import { Film, FilmView, luminance } from "./film";
 import { lightWords, quoted } from "./state";
 
 const WIDTH = 768, SPHERE = 160;
@@ -65,7 +66,16 @@ export class LightsPanel {
   private before: { regions: Uint32Array; lights: number; of: string } | null = null;
   private timer = 0;
 
+  private showMark: (place: [number, number] | null) => void;
+  private pointed: [number, number] | null = null;
+
   constructor(private app: App) {
+    const viewer = $("rig-film").parentElement!;
+    this.showMark = mark(viewer);
+    for (const event of ["pointerdown", "pointermove"] as const) viewer.addEventListener(event, (event) => {
+      this.pointed = placeOf(event, viewer);
+      this.read();
+    });
     app.on((what) => this.changed(what));
     $("method").addEventListener("change", () => app.set({ method: $<HTMLSelectElement>("method").value }, "panel"));
     const slider = $<HTMLInputElement>("n-lights");
@@ -170,6 +180,7 @@ export class LightsPanel {
     this.tellStep(divided, rig.lights.length);
     this.before = { regions, lights: rig.lights.length, of };
     this.drawn = state.lights;
+    this.read();
     const n = 3 * SPHERE * SPHERE;
     const [truth, approximate] = [0, 1].map((i) => Film.fromRgb(SPHERE, SPHERE, spheres.subarray(i * n, (i + 1) * n)));
     const exposure = truth.exposure();
@@ -191,10 +202,21 @@ export class LightsPanel {
     this.rig = this.before = null;
     this.drawn = this.app.state.lights;
     $<HTMLCanvasElement>("rig-marks").getContext("2d")!.clearRect(0, 0, WIDTH, WIDTH / 2);
-    for (const id of ["rig-step", "formats", "dome-files"]) $(id).replaceChildren();
+    this.showMark(null);
+    for (const id of ["rig-step", "rig-readout", "formats", "dome-files"]) $(id).replaceChildren();
     $("rig-shading").hidden = $("rig-command").hidden = true;
     $("rig-caption").textContent = `There are no lights: ${reason.replace(/\.$/, "")}.`;
     document.documentElement.dataset.rig = "none";
+  }
+
+  /** Shows the light of the region that was pointed at. */
+  private read() {
+    const { pointed, before, rig, map: { films: [film] } } = this;
+    if (!pointed || !before || !rig || !film) return;
+    const i = Math.floor(pointed[1] * WIDTH / 2) * WIDTH + Math.floor(pointed[0] * WIDTH), light = rig.lights[before.regions[i]];
+    this.showMark(light?.uv ?? pointed);
+    const region = light ? `its region’s light, ${light.name.replace("_", " ")}, has ${percentage(light.share)} of all light, spread like a disc of radius ${light.radius.toFixed(1)}°` : "no light stands for it";
+    $("rig-readout").textContent = `In this direction, L = ${short(luminance(film.pixels, 4 * i))}; ${region}.`;
   }
 
   /** Describes the last step. */

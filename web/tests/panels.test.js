@@ -370,6 +370,25 @@ test("a sign says that the page works, until it is done", async () => {
   await done();
 });
 
+test("lights: the region under the pointer names its light", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lights&lights=8&method=median-cut`);
+  await page.waitForSelector("html[data-rig]");
+  const lights = await page.evaluate(async () => {
+    const settings = { method: "median-cut", refine: true, n: 8, sun: false, lamps: 0 };
+    return JSON.parse(await window.domelight.app.engines.call("lights", JSON.stringify(settings))).lights;
+  });
+  for (const { uv: [u, v], name, share } of lights) {
+    const box = await page.locator("#lights .viewer").boundingBox();
+    await page.mouse.move(box.x + u * box.width, box.y + v * box.height);
+    await page.waitForFunction((name) => document.getElementById("rig-readout").textContent.includes(`${name}, has `), name.replace("_", " "));
+    const stated = /^In this direction, L = .*, has ([\d.]+) % of all light, spread like a disc of radius [\d.]+°\.$/.exec(await text(page, "#rig-readout"));
+    assert.ok(Math.abs(Number(stated[1]) - 100 * share) < 0.1, `${stated[0]} for ${share}`);
+    const left = await page.$eval("#lights .mark", (mark) => parseFloat(mark.style.left));
+    assert.ok(Math.abs(left - 100 * u) < 0.1);
+  }
+  await done();
+});
+
 test("lights: regions, files of every format, and what is left", async () => {
   const { page, done } = await open(SMALL);
   await show(page, "lights");
