@@ -113,6 +113,13 @@ test("the X-ray works", { skip }, async () => {
   assert.match(await page.$eval("#xray-summary", (e) => e.textContent), /Pixel 31, 31 of 64 × 64/);
   assert.ok((await page.$$("#causes .bar")).length >= 4);
   assert.ok(await brightness(page, "xray-film") > 40);
+  // A direction that is pointed at on one hemisphere is marked on all, and read.
+  const hemisphere = await page.$("#hemispheres .marked");
+  await hemisphere.evaluate((element) => element.scrollIntoView({ block: "center" }));
+  const { x, y, width, height } = await hemisphere.boundingBox();
+  await page.mouse.move(x + 0.5 * width, y + 0.5 * height);
+  await page.waitForFunction(() => /^In this direction, L = /.test(document.getElementById("xray-readout").textContent)
+    && [...document.querySelectorAll(".hemispheres .mark")].every(({ hidden }) => !hidden), { timeout: 60_000 });
   await done();
 });
 
