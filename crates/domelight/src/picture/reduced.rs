@@ -120,6 +120,19 @@ mod tests {
     }
 
     #[test]
+    fn damaged_files_are_refused_or_read() {
+        let options = ReadOptions { max_memory: Some(1 << 20), ..ReadOptions::default() };
+        for bytes in files() {
+            for i in (0..bytes.len()).step_by(3) {
+                let mut damaged = bytes.clone();
+                damaged[i] ^= 0x5a;
+                drop(read_reduced(&damaged, "map", 2, &options));
+                drop(read_reduced(&bytes[..i], "map", 2, &options));
+            }
+        }
+    }
+
+    #[test]
     fn what_cannot_be_reduced_is_refused() {
         let options = ReadOptions { max_memory: Some(20_000), ..ReadOptions::default() };
         let kind = |bytes: &[u8], factor| {
