@@ -367,6 +367,11 @@ test("a sign says that the page works, until it is done", async () => {
   await page.waitForSelector("#busy", { state: "visible" });
   await page.waitForFunction(() => /is saved/.test(document.getElementById("status").textContent));
   await page.waitForSelector("#busy", { state: "hidden" });
+  // While a figure renders, too.
+  await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=9`);
+  await page.waitForSelector("#busy", { state: "visible" });
+  await settled(page);
+  await page.waitForSelector("#busy", { state: "hidden" });
   await done();
 });
 

@@ -1,5 +1,6 @@
 // What renders the pictures of figures: scenes of their own, on an engine beside the page's.
 
+import { whileBusy } from "../busy";
 import type { App } from "../app";
 import type { Host } from "../engines";
 import { Film, luminance } from "../film";
@@ -84,7 +85,7 @@ export class Lab {
 
   /** Does what is asked when all before it is done. */
   private next<T>(of: Situation, act: () => Promise<T>): Promise<T> {
-    const next = this.last.then(() => this.load(of)).then(act);
+    const next = whileBusy(this.last.then(() => this.load(of)).then(act));
     this.last = next.catch(() => {});
     return next;
   }
