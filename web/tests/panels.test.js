@@ -368,7 +368,7 @@ test("a sign says that the page works, until it is done", async () => {
   await page.waitForFunction(() => /is saved/.test(document.getElementById("status").textContent));
   await page.waitForSelector("#busy", { state: "hidden" });
   // While a figure renders, too.
-  await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=9`);
+  await page.evaluate((hash) => { location.hash = hash; }, `${SMALL}&panel=lecture&step=9&figure=0.5;0.08;0.6;sphere;3`);
   await page.waitForSelector("#busy", { state: "visible" });
   await settled(page);
   await page.waitForSelector("#busy", { state: "hidden" });
