@@ -151,6 +151,8 @@ pub(super) struct Cells {
     pub(super) mass: Box<CellArray>,
     /// The solid angle divided by the mass.
     pub(super) inverse_radiance: Box<CellArray>,
+    /// ∫ luminance dω/∫ luminance² dω, estimated from a few directions. At most [`Cells::inverse_radiance`].
+    pub(super) inverse_brightness: Box<CellArray>,
 }
 
 /// The soft step of the cosine over a cell, from its angular radius r and the spread of normals.
@@ -194,6 +196,7 @@ impl Cells {
             bounding_angle: zeros(),
             mass: zeros(),
             inverse_radiance: zeros(),
+            inverse_brightness: zeros(),
         };
         cells.number(tree, 0, &tree.nodes[0]);
         cells.known = cells.first_steps();
@@ -214,8 +217,20 @@ impl Cells {
             *get_mut(&mut cells.mass, slot) = square.mass;
             *get_mut(&mut cells.inverse_radiance, slot) =
                 (map.area(&square).0 / f64::from(square.mass)) as f32;
+            *get_mut(&mut cells.inverse_brightness, slot) =
+                (1.0 / cells.brightness(map.environment, cell)) as f32;
         }
         cells
+    }
+
+    /// ∫ luminance² dω/∫ luminance dω over a cell: the mean luminance of directions that are drawn in it.
+    fn brightness(&self, environment: &Environment, cell: usize) -> f64 {
+        const N: u32 = 16;
+        let luminance = |i: u32| {
+            let u = (f64::from(i) + 0.5) / f64::from(N);
+            f64::from(self.draw(environment, cell, u, [0.5; 2]).1.luminance())
+        };
+        (0..N).map(luminance).sum::<f64>() / f64::from(N)
     }
 
     /// Numbers the leaves below split `split` along the curve.

@@ -197,6 +197,7 @@ mod tests {
     use super::super::candidates::{Candidates, Sources};
     use super::super::hits::{Groups, Hits};
     use super::super::light_samples::PassLength;
+    use super::super::lobe_share::LobeShare;
     use super::super::strata::{Counts, PixelSamples};
     use super::super::table::Table;
     use super::super::test_support::{hit, sky};
@@ -232,19 +233,17 @@ mod tests {
                 (ControlVariate::default(), Candidates::default());
             groups.cluster(hits);
             table.fill::<S, true>(simd, cells, &groups.all, &mut control_variate);
-            table.keep_product(simd, cells, &Briefing::default().rms);
+            let counts = Counts { light: 40, brdf: 4, portal: 0 };
+            let (rms, mut lobe_share) = (&Briefing::default().rms, LobeShare::default());
+            let counts = lobe_share.divide(simd, cells, (&table, rms), &groups, counts);
+            lobe_share.apply(simd, cells, &mut table, &mut control_variate);
+            table.keep_product(simd, cells, rms);
             let (std_dev, is_glossy) = (self.visible, groups.is_glossy());
             let above = &control_variate.above;
             table.weight_by_visibility(simd, cells, above, (self.visible, std_dev), is_glossy);
             table.accumulate(simd, cells);
-            let counts = Counts { light: 40, brdf: 4, portal: 0 };
-            let rms = &Briefing::default().rms;
-            control_variate.balance(
-                simd,
-                cells,
-                rms,
-                groups.brdf_share(counts, table.product_total()),
-            );
+            let share = groups.brdf_share(counts, table.product_total());
+            control_variate.balance(simd, cells, rms, share);
             let numbers = PixelSamples::new(Sampler::new(SamplerKind::Independent, self.seed, 0));
             let sources = Sources {
                 portals: Portals::new(&[]),

@@ -69,13 +69,14 @@ impl TileEstimator<'_, '_> {
         let points = &tile.points[pixel.points.clone()];
         let hits = Hits { points, one_material: pixel.one_material };
         self.scratch.sampled_pixels.push(i);
-        // Group the hits by surface and normal, and divide the candidates between light and BRDF.
+        // Group the hits by surface and normal.
         self.scratch.groups.cluster(hits);
         let has_portals = !tile.portals.is_empty();
         let counts =
             self.strategy.counts(&self.scratch.groups, points.len(), self.pilots, has_portals);
-        // Tabulate light times reflectance over the cells (Clarberg & Akenine-Möller 2008, section 3).
-        self.tabulate_product(simd, block, counts, points);
+        // Tabulate light times reflectance over the cells (Clarberg & Akenine-Möller 2008, section 3), and divide it
+        // between strata and BRDF samples.
+        let counts = self.tabulate_product(simd, block, counts, points);
         // Draw candidates from the table and from the BRDF, weighted by the balance heuristic (Veach 1997, eq. 9.8).
         let numbers = self.pixel_numbers(pixel);
         self.draw_candidates(simd, hits, counts, &numbers);
@@ -92,7 +93,7 @@ impl TileEstimator<'_, '_> {
         self.choose_rays(simd, pixel, block, importance, numbers.choice);
     }
 
-    /// Fills the table and, except for pilots, the control variate.
+    /// Fills the table and, except for pilots, the control variate. Returns the numbers of candidates.
     ///
     /// Strata follow the light times the uncertainty of visibility, but the balance heuristic weights them by the product
     /// and what scouts have seen, because BRDF samples do not come from the pool from which the tile has learned.
@@ -104,7 +105,7 @@ impl TileEstimator<'_, '_> {
         block: usize,
         counts: Counts,
         points: &[ShadingPoint],
-    ) {
+    ) -> Counts {
         let cells = self.cells;
         let ProductScratch {
             groups,
@@ -113,19 +114,25 @@ impl TileEstimator<'_, '_> {
             visibility,
             briefing,
             strata_share,
+            lobe_share,
             ..
         } = &mut *self.scratch;
+        let rms = &briefing.rms;
         if self.pilots {
             table.fill::<S, false>(simd, cells, &groups.all, control_variate);
-            table.keep_product(simd, cells, &briefing.rms);
+        } else {
+            table.fill::<S, true>(simd, cells, &groups.all, control_variate);
+        }
+        let counts = lobe_share.divide(simd, cells, (table, rms), groups, counts);
+        lobe_share.apply(simd, cells, table, control_variate);
+        table.keep_product(simd, cells, rms);
+        if self.pilots {
             for pair in cells.pairs() {
-                table.scale(simd, pair, briefing.rms.pair(simd, pair));
+                table.scale(simd, pair, rms.pair(simd, pair));
             }
             table.accumulate(simd, cells);
-            return;
+            return counts;
         }
-        table.fill::<S, true>(simd, cells, &groups.all, control_variate);
-        table.keep_product(simd, cells, &briefing.rms);
         if counts.portal > 0 {
             let strata = counts.light as f32 / table.product_total().max(f32::MIN_POSITIVE);
             let portals = (Portals::new(self.tile.portals), counts.portal);
@@ -137,7 +144,8 @@ impl TileEstimator<'_, '_> {
         table.weight_by_visibility(simd, cells, above, visibility.of(block), is_glossy);
         table.accumulate(simd, cells);
         let brdf_share = groups.brdf_share(counts, table.product_total());
-        control_variate.balance(simd, cells, &briefing.rms, brdf_share);
+        control_variate.balance(simd, cells, rms, brdf_share);
+        counts
     }
 
     /// The random numbers of a pixel in the pass.

@@ -167,14 +167,24 @@ impl Groups {
         })
     }
 
-    /// The density of BRDF samples relative to strata of a table with this total, where the light of a cell has
-    /// density 1: the ratio of their numbers, times the light that the pixel reflects, averaged over its lobes.
-    pub(super) fn brdf_share(&self, counts: Counts, total: f32) -> f32 {
+    /// The luminance of the diffuse albedo, averaged over the hits.
+    pub(super) fn diffuse_albedo(&self) -> f32 {
+        self.all.iter().map(|g| g.lobe_summary.diffuse.luminance() * g.share).sum()
+    }
+
+    /// The luminance of the albedo of all lobes, averaged over the hits.
+    pub(super) fn albedo(&self) -> f32 {
         let lobes = self.all.iter().flat_map(|g| {
             let diffuse = std::iter::once(g.lobe_summary.diffuse);
             diffuse.chain(g.lobe_summary.lobes().map(|(c, _)| c)).map(|c| c.luminance() * g.share)
         });
-        let albedo: f32 = lobes.sum();
+        lobes.sum()
+    }
+
+    /// The density of BRDF samples relative to strata of a table with this total, where the light of a cell has
+    /// density 1: the ratio of their numbers, times the light that the pixel reflects, averaged over its lobes.
+    pub(super) fn brdf_share(&self, counts: Counts, total: f32) -> f32 {
+        let albedo = self.albedo();
         if counts.brdf == 0 || albedo <= 0.0 {
             return 0.0;
         }

@@ -6,8 +6,8 @@
 //!
 //! 1. A `table` holds the light times the reflectance of each cell.
 //! 2. `candidates` are strata along the curve, each with one direction from the pool, BRDF samples where the table
-//!    approximates the BRDF badly, and points on portals if the scene has any (`portal_light`), weighted by the balance
-//!    heuristic.
+//!    approximates the BRDF badly (`lobe_share`), and points on portals if the scene has any (`portal_light`), weighted by
+//!    the balance heuristic.
 //! 3. The tile's pixels are processed in [levels](super::levels). Pixels of the first level, the *pilots*, trace all
 //!    their candidates. From the rays of each level, the tile learns the `visibility` V̂ of each cell and the
 //!    brightness of its pixels. Scouts have begun to learn it before.
@@ -40,6 +40,7 @@ mod control_variate;
 mod estimator;
 mod hits;
 mod light_samples;
+mod lobe_share;
 mod portal_light;
 mod prior;
 mod rays;
@@ -68,6 +69,7 @@ use control_variate::ControlVariate;
 use estimator::TileEstimator;
 use hits::Groups;
 use light_samples::{LightSamplePool, PassLength};
+use lobe_share::LobeShare;
 use portal_light::StrataShare;
 use strata::{CandidateIndex, Counts};
 use table::Table;
@@ -84,8 +86,8 @@ const PILOT: usize = 2;
 /// The maximum number of candidates per pixel and pass, which limits memory.
 const MAX_CANDIDATES: u32 = 1 << 14;
 
-/// One candidate in this many is a BRDF sample where the table approximates the BRDF badly: if normals vary or the
-/// view is oblique, and for lobes narrower than most cells.
+/// At least one candidate in this many is a BRDF sample where the table approximates the BRDF badly: if normals vary or
+/// the view is oblique, and for lobes narrower than most cells.
 const BRDF_SHARE: [usize; 2] = [8, 4];
 
 /// One candidate in this many is a point on a portal if there are portals.
@@ -186,6 +188,7 @@ pub struct ProductScratch {
     /// The candidates of the chosen strata.
     chosen: Vec<CandidateIndex>,
     strata_share: StrataShare,
+    lobe_share: LobeShare,
     visibility: VisibilityEstimate,
     /// The slot of each ray's cell in this round.
     targets: Vec<u16>,

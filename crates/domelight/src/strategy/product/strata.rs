@@ -18,6 +18,13 @@ impl Counts {
     pub(super) fn total(self) -> usize {
         self.light + self.brdf + self.portal
     }
+
+    /// At least the given fraction of strata and BRDF samples are BRDF samples; one stratum remains.
+    pub(super) fn with_brdf_share(self, share: f32) -> Self {
+        let all = self.light + self.brdf;
+        let brdf = self.brdf.max((share * all as f32) as usize).min(all - 1);
+        Self { light: all - brdf, brdf, ..self }
+    }
 }
 
 /// The assignment of strata to hits: stratum k belongs to hit (k − r) mod n.

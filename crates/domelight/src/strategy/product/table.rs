@@ -116,6 +116,20 @@ impl Table {
         }
     }
 
+    /// The reflectance of lobes and of all, for a pair of rows of cells, if `diffuse` is the diffuse albedo. The last
+    /// group's cosine stands for those of all groups.
+    #[inline(always)]
+    pub(super) fn reflectance<S: Simd>(
+        &self,
+        simd: S,
+        pair: usize,
+        diffuse: S::F32x16,
+    ) -> [S::F32x16; 2] {
+        let all = self.weight.pair(simd, pair);
+        let diffuse = diffuse * self.cosine.pair(simd, pair) * simd.splat_f32x16(FRAC_1_PI);
+        [(all - diffuse).max(simd.splat_f32x16(0.0)), all]
+    }
+
     /// Keeps light times reflectance, times what scouts tell about visibility, as the density that the balance heuristic
     /// assumes for strata.
     #[inline(always)]
