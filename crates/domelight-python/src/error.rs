@@ -59,9 +59,11 @@ pub(crate) fn in_python(text: &str) -> String {
         let (option, rest) = part.split_at(end);
         // Another character belongs to the name of a file.
         if rest.is_empty() || rest.starts_with([' ', ',', ';', ':', ')']) {
-            spelled += &format!(" {}", option.trim_start_matches("env-").replace('-', "_"));
+            spelled.push(' ');
+            spelled += &option.trim_start_matches("env-").replace('-', "_");
         } else {
-            spelled += &format!(" --{option}");
+            spelled += " --";
+            spelled += option;
         }
         spelled += rest;
     }
