@@ -53,6 +53,12 @@ impl CellArray {
     }
 }
 
+impl Default for CellArray {
+    fn default() -> Self {
+        ZERO_CELLS
+    }
+}
+
 impl Deref for CellArray {
     type Target = [Lanes; TABLE_ROWS];
 

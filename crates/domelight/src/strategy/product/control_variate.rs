@@ -21,7 +21,7 @@
 //! map, not over the pool. For that reason, h is also weighted as the balance heuristic weights strata at the center
 //! of the cell.
 
-use super::cells::{CellArray, Cells, ZERO_CELLS};
+use super::cells::{CellArray, Cells};
 use super::hits::Group;
 use super::light_samples::LightSamplePool;
 use crate::Rgb;
@@ -29,7 +29,7 @@ use crate::math::{FRAC_1_PI, Vec3};
 use crate::simd::{Colors, Simd, SimdF32x8, SimdF32x16, Vectors};
 
 /// The function h of a pixel.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct ControlVariate {
     /// 1 for cells above the horizon of all groups, otherwise 0.
     pub(super) above: CellArray,
@@ -37,12 +37,6 @@ pub(super) struct ControlVariate {
     gloss: [CellArray; 4],
     /// k_s, with luminance 1; `None` without glossy lobes.
     tint: Option<Rgb>,
-}
-
-impl Default for ControlVariate {
-    fn default() -> Self {
-        Self { above: ZERO_CELLS, gloss: [ZERO_CELLS; 4], tint: None }
-    }
 }
 
 /// Σ_c V̂_c ∫ h L dω.
@@ -278,7 +272,7 @@ mod tests {
         let [cells] = Cells::new(&environment, [PassLength::Short.rows()]).unwrap();
         let sampler = Sampler::for_pass(SamplerKind::Sobol, 1, 0);
         let pool = LightSamplePool::draw(&cells, &environment, sampler, PassLength::Short);
-        let mut visible = ZERO_CELLS;
+        let mut visible = CellArray::default();
         for (i, v) in visible.iter_mut().flatten().enumerate() {
             *v = 0.01 + (i % 7) as f32 / 7.0;
         }

@@ -15,7 +15,7 @@
 //! that of the cell that is seen best. This is MIS compensation (Karlík et al. 2019, "MIS Compensation: Optimizing Sampling
 //! Techniques in Multiple Importance Sampling") with s in place of a constant radiance to subtract.
 
-use super::cells::{CellArray, Cells, ZERO_CELLS};
+use super::cells::{CellArray, Cells};
 use super::control_variate::ControlVariate;
 use super::hits::Groups;
 use super::strata::Counts;
@@ -29,25 +29,19 @@ const MOST: f32 = 0.9;
 /// The roughness from which lobes are wide enough for strata alone.
 const WIDE: f32 = 0.15;
 
-/// The roughness below which a lobe counts as no narrower.
+/// Narrower lobes count as having this roughness.
 const LEAST_WIDTH: f32 = 1e-3;
 
-/// The least factor of light that is seen.
+/// The factor of the cell that is seen best is at least this.
 const LEAST_SEEN: f32 = 1e-3;
 
 /// The factors on the density of strata.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct LobeShare {
     /// s.
     of_strata: CellArray,
-    /// Whether s = 1 in all cells, whatever `of_strata` says.
-    is_one: bool,
-}
-
-impl Default for LobeShare {
-    fn default() -> Self {
-        Self { of_strata: ZERO_CELLS, is_one: true }
-    }
+    /// Whether BRDF samples have a part; without one, s = 1 in all cells, whatever `of_strata` says.
+    is_divided: bool,
 }
 
 impl LobeShare {
@@ -63,7 +57,7 @@ impl LobeShare {
         counts: Counts,
     ) -> Counts {
         let Some(width) = groups.narrowest().filter(|&width| width < WIDE) else {
-            self.is_one = true;
+            self.is_divided = false;
             return counts;
         };
         let one = |x| simd.splat_f32x16(x);
@@ -93,7 +87,7 @@ impl LobeShare {
         }
         let left = left.sum() / of_all.sum().max(f32::MIN_POSITIVE);
         let counts = counts.with_brdf_share(MOST * left);
-        self.is_one = counts.brdf == 0;
+        self.is_divided = counts.brdf > 0;
         counts
     }
 
@@ -106,7 +100,7 @@ impl LobeShare {
         table: &mut Table,
         control_variate: &mut ControlVariate,
     ) {
-        if self.is_one {
+        if !self.is_divided {
             return;
         }
         for pair in cells.pairs() {
@@ -157,7 +151,7 @@ mod tests {
             |material| dispatch(InstructionSet::best(), Divide { cells: &cells, material });
         for material in ["diffuse:0.8", "ggx:0.2", "gltf:0.9,0.6,0.3:0.5:0.5"] {
             let (share, counts) = divide(material);
-            assert!(share.is_one, "{material}");
+            assert!(!share.is_divided, "{material}");
             assert_eq!(counts, Counts { light: 60, brdf: 0, portal: 4 }, "{material}");
         }
         let slots = || (0..cells.len()).map(|cell| cells.slot(cell));

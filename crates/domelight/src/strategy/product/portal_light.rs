@@ -5,7 +5,7 @@
 //! from that of cells, in slots of its own, because a cell at the frame of a window is half visible, but a portal sample
 //! in it is not.
 
-use super::cells::{CellArray, Cells, TABLE_ROWS, ZERO_CELLS};
+use super::cells::{CellArray, Cells, TABLE_ROWS};
 use super::control_variate::ControlVariate;
 use super::table::{Table, center};
 use crate::math::Vec3;
@@ -30,18 +30,12 @@ const LEAST_ANGLE: f32 = 1e-6;
 const LEAST_SHARE: f32 = 0.1;
 
 /// What the balance heuristic leaves to strata of the light of each cell.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct StrataShare {
     /// The root mean square of M p₀/(M p₀ + Q p_portal) over the cell.
     rms: CellArray,
     /// 1 for cells without a direction through a portal, otherwise 0.
     whole: CellArray,
-}
-
-impl Default for StrataShare {
-    fn default() -> Self {
-        Self { rms: ZERO_CELLS, whole: ZERO_CELLS }
-    }
 }
 
 impl StrataShare {

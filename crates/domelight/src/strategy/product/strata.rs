@@ -19,7 +19,8 @@ impl Counts {
         self.light + self.brdf + self.portal
     }
 
-    /// At least the given fraction of strata and BRDF samples are BRDF samples; one stratum remains.
+    /// The same number of candidates, with BRDF samples in at least `share` of the places of strata and BRDF samples; one
+    /// stratum remains.
     pub(super) fn with_brdf_share(self, share: f32) -> Self {
         let all = self.light + self.brdf;
         let brdf = self.brdf.max((share * all as f32) as usize).min(all - 1);

@@ -17,7 +17,7 @@
 //! The running sum of the table is a distribution along the curve. Its M strata share one random
 //! offset: stratum k is at u = (k + ξ)/M.
 
-use super::cells::{CellArray, Cells, MAX_ROWS, TABLE_ROWS, ZERO_CELLS};
+use super::cells::{CellArray, Cells, MAX_ROWS, TABLE_ROWS};
 use super::control_variate::ControlVariate;
 use super::hits::Group;
 use super::strata::{Strata, StratumAssignment};
@@ -34,7 +34,7 @@ pub(super) const LEFT_OF_GLOSSY: f32 = 0.15;
 pub(super) const BLIND: f32 = 0.1;
 
 /// A distribution over cells, by slot.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Table {
     /// The weight of the cell; after [`Table::accumulate`], exactly its part of the running sum.
     weight: CellArray,
@@ -49,20 +49,6 @@ pub(super) struct Table {
     /// Light times reflectance without visibility, and its sum.
     product: CellArray,
     product_total: f32,
-}
-
-impl Default for Table {
-    fn default() -> Self {
-        Self {
-            weight: ZERO_CELLS,
-            start: ZERO_CELLS,
-            end: ZERO_CELLS,
-            cosine: ZERO_CELLS,
-            total: 0.0,
-            product: ZERO_CELLS,
-            product_total: 0.0,
-        }
-    }
 }
 
 impl Table {
