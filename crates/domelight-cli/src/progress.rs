@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use domelight::quote::terminal;
-use domelight::render::{Counts, Layers, Observer, Stage, TileView};
+use domelight::render::{Counts, Layers, Observer, Stage, TileView, Window};
 use domelight_lab::WorkProgress;
 use domelight_lab::display::Display;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -155,6 +155,12 @@ impl Observer for RenderProgress {
             print_progress(&format!("openjd_status: {samples}"));
         }
         self.bar.set_prefix(samples);
+    }
+
+    fn tile_started(&self, window: Window) {
+        if let Some(display) = &self.display {
+            display.outline(window);
+        }
     }
 
     fn stage_started(&self, stage: Stage) {

@@ -12,7 +12,7 @@ mod timed;
 use anyhow::{Context as _, Result};
 use domelight::render::{
     Checkpoint, Counts, Film, Layers, Observer, RenderSettings, Renderer, Rendering, Stage,
-    TileView, Tiling,
+    TileView, Tiling, Window,
 };
 use domelight::strategy::Strategy;
 
@@ -443,6 +443,10 @@ struct Deadline<'a> {
 impl Observer for Deadline<'_> {
     fn pass_started(&self, samples: Range<u32>) {
         self.progress.pass_started(samples);
+    }
+
+    fn tile_started(&self, window: Window) {
+        self.progress.tile_started(window);
     }
 
     fn stage_started(&self, stage: Stage) {

@@ -2,9 +2,9 @@
 //!
 //! Both listen for tev's messages on a TCP port, little endian, strings ended by NUL: the length of the message, a byte for
 //! its kind, and its content (`Ipc.h` of tev). A thread sends them. Tiles that wait are replaced by newer ones, so neither a
-//! slow viewer nor one that never reads holds up the render.
+//! slow viewer nor one that never reads holds up the render. The tiles being worked on are outlined.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write as _};
 use std::net::{TcpStream, ToSocketAddrs as _};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -51,6 +51,10 @@ struct Shared {
 struct Waiting {
     /// The newest message of each window, by its corner.
     messages: BTreeMap<[usize; 2], Vec<u8>>,
+    /// The tiles being worked on, as corner and size.
+    tiles: BTreeSet<[usize; 4]>,
+    /// Whether they have changed since they were sent.
+    is_outdated: bool,
     /// No more will come.
     is_over: bool,
     /// Why the viewer gets no more.
@@ -78,16 +82,28 @@ impl Display {
         let names: Vec<&str> = names.iter().map(|(name, _)| &name[..]).collect();
         stream.write_all(&create_image(name, [width, height], &names))?;
         let shared = Arc::<Shared>::default();
-        let of_worker = shared.clone();
-        let worker = std::thread::spawn(move || send(&of_worker, &mut stream));
+        let (of_worker, of_picture) = (shared.clone(), name.to_owned());
+        let worker = std::thread::spawn(move || send(&of_worker, &of_picture, &mut stream));
         Ok(Self { name: name.to_owned(), shared, worker: Mutex::new(Some(worker)) })
+    }
+
+    /// Outlines a tile that is being worked on, soon.
+    pub fn outline(&self, window: Window) {
+        self.change_tiles(|tiles| tiles.insert(corner_and_size(window)));
     }
 
     /// Shows a tile, soon.
     pub fn show(&self, tile: &TileView) {
         if self.shared.waiting().broken.is_none() {
+            self.change_tiles(|tiles| tiles.remove(&corner_and_size(tile.window())));
             self.put(tile.window(), &tile.layers());
         }
+    }
+
+    fn change_tiles(&self, change: impl FnOnce(&mut BTreeSet<[usize; 4]>) -> bool) {
+        let mut waiting = self.shared.waiting();
+        waiting.is_outdated |= change(&mut waiting.tiles);
+        self.shared.changed.notify_one();
     }
 
     /// Shows the finished picture, waits until the viewer has it, and returns why it does not.
@@ -97,6 +113,7 @@ impl Display {
     pub fn finish(&self, layers: &Layers) -> io::Result<()> {
         let (width, height) = (layers.width(), layers.height());
         let whole = channels(&layers.to_exr(Vec::new()));
+        self.change_tiles(|tiles| !std::mem::take(tiles).is_empty());
         for y in (0..height).step_by(BAND) {
             let window = Window { x: 0, y, width, height: BAND.min(height - y) };
             let rows = y * width..(y + window.height) * width;
@@ -143,12 +160,15 @@ impl Drop for Display {
 }
 
 /// Sends what waits until no more comes, or the viewer is gone.
-fn send(shared: &Shared, stream: &mut TcpStream) {
+fn send(shared: &Shared, name: &str, stream: &mut TcpStream) {
     loop {
         let mut waiting = shared.waiting();
         let message = loop {
             if let Some((_, message)) = waiting.messages.pop_first() {
                 break message;
+            }
+            if std::mem::take(&mut waiting.is_outdated) {
+                break outlines(name, &waiting.tiles);
             }
             if waiting.is_over {
                 return;
@@ -163,6 +183,10 @@ fn send(shared: &Shared, stream: &mut TcpStream) {
             return;
         }
     }
+}
+
+fn corner_and_size(window: Window) -> [usize; 4] {
+    [window.x, window.y, window.width, window.height]
 }
 
 /// The channels of layers with their full names; counts as numbers.
@@ -203,6 +227,11 @@ impl Message {
         self
     }
 
+    fn byte(mut self, value: u8) -> Self {
+        self.0.push(value);
+        self
+    }
+
     fn int(mut self, value: usize) -> Self {
         self.0.extend((value as i32).to_le_bytes());
         self
@@ -231,6 +260,29 @@ fn create_image(name: &str, [width, height]: [usize; 2], channels: &[&str]) -> V
     channels.iter().fold(message, |message, channel| message.string(channel)).finish()
 }
 
+/// `VectorGraphics` instead of the earlier ones: a white rectangle around each tile.
+fn outlines(name: &str, tiles: &BTreeSet<[usize; 4]>) -> Vec<u8> {
+    const MOVE: u8 = 2;
+    const LINE: u8 = 3;
+    const COLOR: u8 = 5;
+    const STROKE: u8 = 7;
+    const BEGIN: u8 = 8;
+    let commands = if tiles.is_empty() { 0 } else { 3 + 5 * tiles.len() };
+    let mut message = Message::new(8).string(name).byte(0).int(commands);
+    if tiles.is_empty() {
+        return message.finish();
+    }
+    message = message.byte(BEGIN);
+    for &[x, y, width, height] in tiles {
+        let corners = [[0, 0], [width, 0], [width, height], [0, height], [0, 0]];
+        for (i, [dx, dy]) in corners.into_iter().enumerate() {
+            let at = [x + dx, y + dy].map(|c| c as f32);
+            message = message.byte(if i == 0 { MOVE } else { LINE }).floats(&at);
+        }
+    }
+    message.byte(COLOR).floats(&[1.0; 4]).byte(STROKE).finish()
+}
+
 /// `UpdateImage` of version 3: the channels' values one after the other.
 fn update_image(name: &str, window: Window, channels: &[(String, &[f32])]) -> Vec<u8> {
     let Window { x, y, width, height } = window;
@@ -257,6 +309,10 @@ mod tests {
     struct Showing<'a>(&'a Display);
 
     impl Observer for Showing<'_> {
+        fn tile_started(&self, window: Window) {
+            self.0.outline(window);
+        }
+
         fn tile_rendered(&self, tile: &TileView) {
             self.0.show(tile);
         }
@@ -301,12 +357,36 @@ mod tests {
         }
     }
 
+    /// The number of rectangles in a message of vector graphics, each of which must lie within the picture.
+    fn rectangles(mut content: Content, [columns, rows]: [f32; 2]) -> usize {
+        assert_eq!(content.take::<1>(), [0]);
+        let (commands, mut moves) = (content.int(), 0);
+        for _ in 0..commands {
+            let [command] = content.take::<1>();
+            let n_floats = match command {
+                2 | 3 => 2,
+                5 => 4,
+                7 | 8 => 0,
+                other => panic!("command {other}"),
+            };
+            let floats: Vec<f32> =
+                (0..n_floats).map(|_| f32::from_le_bytes(content.take())).collect();
+            moves += usize::from(command == 2);
+            if let [x, y] = floats[..] {
+                assert!((0.0..=columns).contains(&x) && (0.0..=rows).contains(&y));
+            }
+        }
+        assert!(content.0.is_empty());
+        moves
+    }
+
     /// The viewer's picture after all messages: values by channel.
     fn view(mut stream: TcpStream) -> HashMap<String, Vec<f32>> {
         let mut bytes = Vec::new();
         stream.read_to_end(&mut bytes).unwrap();
         let mut rest = &bytes[..];
         let mut picture = HashMap::new();
+        let mut outlined = Vec::new();
         let mut columns = 0;
         while !rest.is_empty() {
             let length = u32::from_le_bytes(rest[..4].try_into().unwrap()) as usize;
@@ -320,6 +400,10 @@ mod tests {
                 for _ in 0..content.int() {
                     picture.insert(content.string(), vec![f32::NAN; width * height]);
                 }
+                continue;
+            }
+            if kind == 8 {
+                outlined.push(rectangles(content, [70.0, 90.0]));
                 continue;
             }
             assert_eq!(kind, 6);
@@ -337,7 +421,24 @@ mod tests {
                 }
             }
         }
+        // Of tiles that were being worked on, none is left.
+        assert_eq!(outlined.last(), Some(&0));
         picture
+    }
+
+    #[test]
+    fn tiles_are_outlined() {
+        let tiles = BTreeSet::from([[0, 0, 16, 16], [48, 80, 22, 10]]);
+        for (tiles, n) in [(tiles, 2), (BTreeSet::new(), 0)] {
+            let bytes = outlines("a picture", &tiles);
+            assert_eq!(
+                (bytes[..4].to_vec(), bytes[4]),
+                ((bytes.len() as u32).to_le_bytes().to_vec(), 8)
+            );
+            let mut content = Content(&bytes[6..]);
+            assert_eq!(content.string(), "a picture");
+            assert_eq!(rectangles(content, [70.0, 90.0]), n);
+        }
     }
 
     #[test]

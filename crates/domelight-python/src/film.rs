@@ -95,7 +95,7 @@ impl Film {
         Self { sums, counts, complete, n_samples, strategy, provenance, hidden, layers }
     }
 
-    fn layers(&self) -> &Layers {
+    pub(crate) fn layers(&self) -> &Layers {
         self.layers.get_or_init(|| self.sums.layers())
     }
 

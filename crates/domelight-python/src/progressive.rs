@@ -54,7 +54,7 @@ impl Visitor for Steps<'_> {
 
     fn visit<S: Strategy>(self, mut renderer: Renderer<S>) {
         let Self { setup, done, questions, answers } = self;
-        let watch = Watch { setup, done, end: None };
+        let watch = Watch { setup, done, end: None, display: None };
         while questions.recv().is_ok() {
             if renderer.is_complete() {
                 let _ = answers.send(Ok(None));

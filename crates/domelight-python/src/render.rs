@@ -7,16 +7,18 @@ use std::time::{Duration, Instant};
 use domelight::environment;
 use domelight::inspect::{InspectError, Inspector};
 use domelight::render::{
-    Background, Counts, Observer, Passes, Provenance, RenderSettings, Renderer, automatic_exposure,
+    Background, Counts, Observer, Passes, Provenance, RenderSettings, Renderer, TileView, Window,
+    automatic_exposure,
 };
 use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
 use domelight::strategy::{PreparedStrategy, Strategy, StrategyError, StrategyKind, StrategySpec};
+use domelight_lab::display::{self, Display};
 use domelight_lab::job::{Job, Light};
 use domelight_lab::names::file_name;
 use domelight_lab::refuse_repeating_points;
 use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
 use domelight_lab::scene::PreparedSceneRef;
-use pyo3::exceptions::PyMemoryError;
+use pyo3::exceptions::{PyConnectionError, PyMemoryError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::ThreadPool;
@@ -221,6 +223,17 @@ impl RenderSetup {
         &self.environment
     }
 
+    /// Opens the picture in a viewer.
+    fn connect(&self, py: Python<'_>, address: &str) -> PyResult<Display> {
+        let RenderSettings { width, height, .. } = self.settings;
+        let name = file_name(&self.scene.name);
+        py.detach(|| Display::connect(address, &name, [width, height])).map_err(|error| {
+            PyConnectionError::new_err(format!(
+                "display: no viewer listens at {address}; start tev or HDRView first ({error})"
+            ))
+        })
+    }
+
     /// The threads that render.
     pub(crate) fn pool(&self) -> PyResult<ThreadPool> {
         pool(self.n_threads, &self.failure)
@@ -316,9 +329,23 @@ pub(crate) struct Watch<'a> {
     pub(crate) done: &'a AtomicU64,
     /// The end of the time limit; started tiles are finished.
     pub(crate) end: Option<Instant>,
+    /// The viewer in which the picture is shown.
+    pub(crate) display: Option<&'a Display>,
 }
 
 impl Observer for Watch<'_> {
+    fn tile_started(&self, window: Window) {
+        if let Some(display) = self.display {
+            display.outline(window);
+        }
+    }
+
+    fn tile_rendered(&self, tile: &TileView) {
+        if let Some(display) = self.display {
+            display.show(tile);
+        }
+    }
+
     fn tile_finished(&self, counts: &Counts) {
         self.done.fetch_add(counts.camera_rays, Ordering::Relaxed);
     }
@@ -374,6 +401,24 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
     }
 }
 
+/// The viewer in which a render is shown.
+#[derive(FromPyObject)]
+pub(crate) enum Viewer {
+    /// Whether at the usual address.
+    Usual(bool),
+    At(String),
+}
+
+impl Viewer {
+    fn address(&self) -> Option<&str> {
+        match self {
+            Self::Usual(true) => Some(display::ADDRESS),
+            Self::Usual(false) => None,
+            Self::At(address) => Some(address),
+        }
+    }
+}
+
 /// A film; `domelight.render` documents it.
 #[pyfunction]
 pub(crate) fn render<'py>(
@@ -387,10 +432,13 @@ pub(crate) fn render<'py>(
     tile_size: Option<usize>,
     time: Option<f64>,
     progress: Option<Py<PyAny>>,
+    display: Viewer,
 ) -> PyResult<Film> {
     let time = time.map(duration).transpose()?;
     let arguments = Arguments { job: options::job(options)?, strategy, threads, camera, tile_size };
     let setup = &RenderSetup::new(py, scene.get(), env, arguments)?;
+    let display = display.address().map(|address| setup.connect(py, address)).transpose()?;
+    let display = display.as_ref();
     let done = &AtomicU64::new(0);
     let report = |py: Python<'_>| match &progress {
         Some(progress) => progress.bind(py).call1((setup.share(done),)).map(drop),
@@ -401,7 +449,7 @@ pub(crate) fn render<'py>(
             let (sender, results) = mpsc::channel();
             scope.spawn(move || {
                 let rendered = setup.pool().and_then(|pool| {
-                    let watch = Watch { setup, done, end: None };
+                    let watch = Watch { setup, done, end: None, display };
                     let visitor = ToTheEnd { setup, watch, time };
                     caught(|| pool.install(|| setup.with_renderer(visitor)))?
                 });
@@ -415,6 +463,11 @@ pub(crate) fn render<'py>(
         return Err(error);
     }
     let film = result?;
+    if let Some(display) = display
+        && let Err(error) = py.detach(|| display.finish(film.layers()))
+    {
+        warn(py, &[format!("display: the viewer did not take the whole picture: {error}")])?;
+    }
     if let Some(error) = stopped {
         return Err(interrupted(py, error, film)?);
     }

@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import socket
 import subprocess
 import sys
 import textwrap
@@ -110,6 +111,27 @@ def test_threads_and_tiles_change_no_bit(sphere, env):
     product = [dl.render(sphere, env, threads=t, **SMALL) for t in (1, 2)]
     assert product[0] == product[1]
     assert len({*films, *product}) == 2
+
+
+def test_a_viewer_gets_the_picture(sphere, env):
+    received = bytearray()
+
+    def view(server):
+        connection, _ = server.accept()
+        with connection:
+            while block := connection.recv(1 << 16):
+                received.extend(block)
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        viewer = threading.Thread(target=view, args=(server,))
+        viewer.start()
+        film = dl.render(sphere, env, **SMALL, display=f"127.0.0.1:{server.getsockname()[1]}")
+        viewer.join()
+    # The picture is opened first; its red values arrive as they are in the film.
+    assert received[4] == 4
+    assert np.ascontiguousarray(film.color[..., 0]).tobytes() in bytes(received)
+    with pytest.raises(ConnectionError, match="no viewer listens"):
+        dl.render(sphere, env, **SMALL, display="127.0.0.1:1")
 
 
 @pytest.mark.parametrize("strategy", ["product:4", "environment:2", "sir"])

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use domelight::render::{Counts, Observer, Stage, TileView};
+use domelight::render::{Counts, Observer, Stage, TileView, Window};
 
 use crate::progress::RenderProgress;
 
@@ -160,6 +160,10 @@ impl Observer for PassWatch<'_> {
     fn pass_started(&self, samples: Range<u32>) {
         self.samples.store(samples.len() as u64, Ordering::Relaxed);
         self.progress.pass_started(samples);
+    }
+
+    fn tile_started(&self, window: Window) {
+        self.progress.tile_started(window);
     }
 
     fn stage_started(&self, stage: Stage) {

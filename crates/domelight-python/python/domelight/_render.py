@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ._options import RenderOptions
     from .strategies import Strategy
 
-
 @takes(RENDER)
 def render(
     scene: Scene,
@@ -29,6 +28,7 @@ def render(
     tile_size: int | None = None,
     time: float | None = None,
     progress: bool | Callable[[float], object] = False,
+    display: bool | str = False,
     **options: Unpack[RenderOptions],
 ) -> Film:
     """Render a scene under an environment.
@@ -59,6 +59,9 @@ def render(
     progress : bool or callable, default False
         True shows a bar if tqdm is installed; a callable receives the finished fraction, in [0, 1], every hundredth of
         a second.
+    display : bool or str, default False
+        Show the picture while it is made in a viewer such as tev or HDRView that listens at this address, as
+        'localhost:14158'. True is the address at which they listen by default, 127.0.0.1:14158.
 
     Returns
     -------
@@ -69,18 +72,20 @@ def render(
     ------
     ValueError
         If a setting is invalid; the message names it.
+    ConnectionError
+        If no viewer listens at the address of `display`.
     RenderInterrupted
         A `KeyboardInterrupt` whose attribute `film` holds the samples so far.
 
     Warns
     -----
     DomelightWarning
-        If samples were NaN or infinite.
+        If samples were NaN or infinite, or the viewer went away.
     """
     shown = bar(progress, "render")
     report = shown or callback(progress)
     try:
-        return _domelight.render(scene, env, strategy, options, threads, camera, tile_size, time, report)
+        return _domelight.render(scene, env, strategy, options, threads, camera, tile_size, time, report, display)
     finally:
         if shown is not None:
             shown.close()

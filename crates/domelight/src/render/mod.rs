@@ -178,6 +178,9 @@ pub trait Observer: Sync {
     /// Called when a pass over the picture begins, with the range of camera samples in each pixel.
     fn pass_started(&self, _samples: std::ops::Range<u32>) {}
 
+    /// Called when the calling thread begins a tile of a pass.
+    fn tile_started(&self, _window: Window) {}
+
     /// Called when the calling thread begins a stage of a tile.
     fn stage_started(&self, _stage: Stage) {}
 

@@ -275,6 +275,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
                 if observer.canceled() {
                     return false;
                 }
+                observer.tile_started(tile.window);
                 let before = observer.may_cut_short().then(|| tile.clone());
                 let counts = tile.render(context, strategy, &pass, scratch, observer);
                 if let Some(before) = before.filter(|_| observer.has_cut_short()) {
