@@ -8,6 +8,7 @@ import argparse
 import json
 import os
 import pathlib
+import shutil
 import struct
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import numpy as np
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE / "consumers")]
 
+import balls
 import mitsuba3
 import probe
 import radiance
@@ -384,6 +386,55 @@ def check_readers(table, rigs):
             table.count(name, f"{rig.name}: panorama not found", int(not (rig.folder / file).is_file()))
 
 
+def check_balls(table):
+    """Prefiltered light in the engines that read it, beside our own render."""
+    folder = OUT / "balls"
+    ours = balls.prepare(domelight, folder)
+    command = ["node", HERE / "web" / "balls.mjs", folder, balls.N * balls.SIZE, balls.SIZE]
+    done = subprocess.run(list(map(str, command)), cwd=HERE, capture_output=True, text=True)
+    sys.stderr.write(done.stderr)
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+    versions = json.loads(done.stdout)
+    rows = []
+    for engine, expected in ours.items():
+        name = f"{ENGINE_NAMES[engine]} {versions[f'balls-{engine}']}"
+        picture = balls.read_pixels(folder / f"{engine}.f32")
+        rows += [picture, expected]
+        for ball, middle, whole in balls.distances(picture, expected):
+            table.check(name, f"{ball}: middle of the ball", middle, balls.MIDDLE[ball.split()[0]])
+            table.check(name, f"{ball}: RMS difference", whole, balls.WHOLE)
+    sheet = np.concatenate(rows, 0)
+    write_png(folder / "balls.png", (255 * np.clip(sheet, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8))
+
+
+def check_tracer(table):
+    """The example that samples a map by its tables: no bias, and less noise than without them."""
+    folder = OUT / "tracer"
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(HERE.parents[1] / "docs" / "examples" / "path-tracer.html", folder)
+    modules = folder / "node_modules"
+    if not modules.exists():
+        modules.symlink_to(HERE / "node_modules")
+    domelight("tables", "studio", "-o", folder / "studio.ktx2", "--snippet", "glsl")
+    command = ["node", HERE / "web" / "tracer.mjs", folder, folder / "tracer.png"]
+    done = subprocess.run(list(map(str, command)), cwd=HERE, capture_output=True, text=True)
+    sys.stderr.write(done.stderr)
+    panes = json.loads(done.stdout)
+    if not isinstance(panes, list):
+        raise RuntimeError(panes)
+    name = "three.js, path tracing by tables"
+    uniform, cosine, tables = panes
+    # A pane has 96² pixels, whose errors are independent.
+    for what, pane in [("uniform", uniform), ("cosine", cosine)]:
+        error = np.hypot(pane["noise"] * pane["mean"], tables["noise"] * tables["mean"]) / 96
+        z = abs(pane["mean"] - tables["mean"]) / error
+        table.check(name, f"mean beside {what} samples, standard errors", z, 4, 0.01, "{:.2f}")
+        table.check(name, f"noise over that of {what} samples", tables["noise"] / pane["noise"], 0.5, 0.01, "{:.3f}")
+
+
+ENGINE_NAMES = {"three": "three.js", "babylon": "Babylon.js", "filament": "Filament"}
+
 ENGINES = {
     "Godot 4": ("tscn", readers.godot),
     "Unreal": ("unreal.py", readers.unreal),
@@ -487,6 +538,8 @@ def main():
         ("three.js, Babylon.js", check_web),
         ("pbrt-v4, sIBL", check_readers),
         ("Godot, Unreal, Unity, Bevy", check_engines),
+        ("prefiltered light in three.js, Babylon.js, Filament", lambda table, _: check_balls(table)),
+        ("path tracing by tables in three.js", lambda table, _: check_tracer(table)),
         ("names of files", lambda table, _: check_names(table)),
     ]
     for name, check in checks:

@@ -6,16 +6,17 @@ use anyhow::{Context as _, Result};
 use domelight::environment::Environment;
 use domelight::files::create_folder;
 use domelight::picture::exr::ExrLayers;
-use domelight::picture::texture::{ClippedLight, TexelFormat, Texture, dds, ktx2};
+use domelight::picture::texture::{ClippedLight, Container, RadianceFile, Texture};
 use domelight::rig::ibl::{
-    BrdfTable, Cube, Engine, IblSettings, PrefilteredLight, TableTerms, prefilter,
+    BrdfTable, Cube, Engine, IblSettings, PrefilteredLight, SunError, SunTreatment, TableTerms,
+    TreatedEnvironment, prefilter,
 };
-use domelight::rig::{ExtractionSettings, RigError, RigLight, extract};
+use domelight::rig::{RigError, RigLight};
 use domelight::scene::SceneDescription;
 use domelight::{Rgb, RgbImage};
 use serde_json::{Value, json};
 
-use crate::args::ibl::{Container, IblArguments, IblPath, SunTreatment, TexturePath};
+use crate::args::ibl::{IblArguments, IblPath, TexturePath};
 use crate::error::{UsageError, warn};
 use crate::files;
 use crate::memory;
@@ -24,27 +25,24 @@ use crate::scene::without_camera;
 use crate::terminal::Terminal;
 use domelight_lab::names::file_name;
 
-/// Columns of the table of the BRDF.
-const TABLE_SIZE: usize = 128;
-
-/// Columns of a face of the irradiance cube.
-const IRRADIANCE_SIZE: usize = 32;
-
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &IblArguments, quiet: bool) -> Result<()> {
-    let settings = arguments.settings();
+    let engine = arguments.target()?;
+    let settings = IblSettings::for_engine(engine, arguments.size as usize);
     let results = Results::of(arguments, settings.roughness.len());
     results.declare()?;
     let (environment, probe) = arguments.load(&settings, quiet)?;
-    let (environment, sun) = arguments.treat_sun(environment, &probe, quiet)?;
-    let light = prefilter(&environment, &settings).with_context(|| probe.clone())?;
-    let (radiance, clipped) = Texture::cube(&light.levels, arguments.texels.into());
+    let treated = arguments.treat_sun(&environment, &probe, quiet)?;
+    let light = prefilter(&treated.environment, &settings).with_context(|| probe.clone())?;
+    let clipped = arguments.radiance_file().clipped(&light);
     arguments.report_clipped(clipped, &probe, quiet)?;
-    results.write(arguments, &light, &radiance, &json_of(&light, &settings, sun.as_ref()))?;
+    let sun = treated.sun.as_ref().and_then(|rig| rig.lights.first());
+    let description = json_of(&light, &settings, sun);
+    results.write(arguments, &light, Engine::terms(engine), &description)?;
     if arguments.json {
-        let mut report = json_of(&light, &settings, sun.as_ref());
+        let mut report = description;
         report["probe"] = probe.into();
-        report["engine"] = arguments.engine.map(Engine::name).into();
+        report["engine"] = engine.map(Engine::name).into();
         report["clipped"] = json!({ "texels": clipped.texels, "lost": clipped.lost });
         let names = results.files.iter().map(|(path, _)| path.to_string_lossy().into_owned());
         report["files"] = names.collect();
@@ -60,19 +58,6 @@ pub(crate) fn run(arguments: &IblArguments, quiet: bool) -> Result<()> {
 }
 
 impl IblArguments {
-    fn settings(&self) -> IblSettings {
-        let linear = IblSettings::linear(self.size as usize);
-        let settings = match self.engine {
-            None => linear,
-            Some(engine) => IblSettings {
-                roughness: engine.roughness(self.size as usize),
-                axes: engine.axes(),
-                ..linear
-            },
-        };
-        IblSettings { irradiance_size: IRRADIANCE_SIZE.min(settings.size), ..settings }
-    }
-
     fn load(&self, settings: &IblSettings, quiet: bool) -> Result<(Environment, String)> {
         let given = without_camera(&self.light)?;
         let light = given.over(&SceneDescription::default());
@@ -91,37 +76,30 @@ impl IblArguments {
         Ok((environment, file_name(&probe)))
     }
 
-    /// The environment with the sun kept, removed or clamped, and the removed sun.
-    fn treat_sun(
+    /// The environment with the sun kept, removed or clamped.
+    fn treat_sun<'a>(
         &self,
-        environment: Environment,
+        environment: &'a Environment,
         probe: &str,
         quiet: bool,
-    ) -> Result<(Environment, Option<RigLight>)> {
-        match self.sun {
-            SunTreatment::Keep => Ok((environment, None)),
-            SunTreatment::Clamp(radiance) => {
-                let (clamped, lost) = environment.clamped(radiance)?;
-                if lost > 0.0 {
-                    let percent = 100.0 * lost;
+    ) -> Result<TreatedEnvironment<'a>> {
+        match self.sun.apply(environment) {
+            Err(SunError::Extraction(error @ RigError::NoSun { .. })) if !self.light.strict => {
+                warn(quiet, &format!("{probe}: {error}; nothing is removed"));
+                Ok(SunTreatment::Keep.apply(environment)?)
+            }
+            Err(error @ SunError::NothingLeft) => {
+                Err(UsageError(format!("{probe}: {error}")).into())
+            }
+            treated => {
+                let treated = treated.with_context(|| probe.to_owned())?;
+                if let SunTreatment::Clamp(radiance) = self.sun
+                    && treated.clamped > 0.0
+                {
+                    let percent = 100.0 * treated.clamped;
                     warn(quiet, &format!("{probe}: clamped to {radiance}, -{percent:.2} % light"));
                 }
-                Ok((clamped, None))
-            }
-            SunTreatment::Remove => {
-                let settings = ExtractionSettings { sun: true, ..ExtractionSettings::default() };
-                let extraction = match extract(&environment, settings) {
-                    Err(error @ RigError::NoSun { .. }) if !self.light.strict => {
-                        warn(quiet, &format!("{probe}: {error}; nothing is removed"));
-                        return Ok((environment, None));
-                    }
-                    extraction => extraction.with_context(|| probe.to_owned())?,
-                };
-                let Some(residual) = extraction.residual else {
-                    let text = format!("{probe}: all of its light is the sun; nothing is left");
-                    return Err(UsageError(text).into());
-                };
-                Ok((residual, extraction.rig.lights.first().copied()))
+                Ok(treated)
             }
         }
     }
@@ -131,7 +109,7 @@ impl IblArguments {
         if clipped.texels == 0 {
             return Ok(());
         }
-        let largest = TexelFormat::from(self.texels).largest();
+        let largest = self.radiance_file().largest();
         let text = format!(
             "{probe}: {} texels are brighter than {largest}, the most that the format holds, and are clipped: level 0 \
              loses {:.2} % of its light; rougher levels are filtered before that",
@@ -144,17 +122,13 @@ impl IblArguments {
         warn(quiet, &text);
         Ok(())
     }
-
-    fn terms(&self) -> TableTerms {
-        self.engine.map_or(TableTerms::ScaleAndBias, Engine::table)
-    }
 }
 
 /// What a file holds.
 #[derive(Clone, Copy, Debug)]
 enum Content {
     /// All levels.
-    Radiance(Container),
+    Radiance(RadianceFile),
     Irradiance(Container),
     Table(Container),
     /// One level as a strip of faces.
@@ -194,13 +168,13 @@ impl Results {
     fn of(arguments: &IblArguments, n_levels: usize) -> Self {
         let mut files = Vec::new();
         let folder = match &arguments.output {
-            IblPath::File(TexturePath { path, container }) => {
-                files.push((path.clone(), Content::Radiance(*container)));
+            IblPath::File(path) => {
+                files.push((path.clone(), Content::Radiance(arguments.radiance_file())));
                 None
             }
             IblPath::Folder(folder) => {
                 let mut add = |name: &str, content| files.push((folder.join(name), content));
-                add("radiance.ktx2", Content::Radiance(Container::Ktx2));
+                add("radiance.ktx2", Content::Radiance(arguments.radiance_file()));
                 add("irradiance.ktx2", Content::Irradiance(Container::Ktx2));
                 add("brdf.ktx2", Content::Table(Container::Ktx2));
                 for level in 0..n_levels {
@@ -233,7 +207,7 @@ impl Results {
         &self,
         arguments: &IblArguments,
         light: &PrefilteredLight,
-        radiance: &Texture,
+        terms: TableTerms,
         description: &Value,
     ) -> Result<()> {
         if let Some(folder) = &self.folder {
@@ -241,14 +215,14 @@ impl Results {
         }
         for (path, content) in &self.files {
             match content {
-                Content::Radiance(container) => write_texture(path, *container, radiance)?,
+                Content::Radiance(file) => files::write(path, |out| file.encode(light, out))?,
                 Content::Irradiance(container) => {
                     let levels = std::slice::from_ref(&light.irradiance);
-                    let (texture, _) = Texture::cube(levels, arguments.texels.into());
+                    let (texture, _) = Texture::cube(levels, arguments.texel_format());
                     write_texture(path, *container, &texture)?;
                 }
                 Content::Table(container) => {
-                    let table = BrdfTable::new(TABLE_SIZE, arguments.terms());
+                    let table = BrdfTable::new(BrdfTable::SIZE, terms);
                     write_texture(path, *container, &Texture::table(&table))?;
                 }
                 Content::LevelPicture(level) => write_strip(path, &light.levels[*level])?,
@@ -264,10 +238,7 @@ impl Results {
 }
 
 fn write_texture(path: &Path, container: Container, texture: &Texture) -> Result<()> {
-    files::write(path, |out| match container {
-        Container::Ktx2 => ktx2::encode(texture, out),
-        Container::Dds => dds::encode(texture, out),
-    })
+    files::write(path, |out| container.encode(texture, out))
 }
 
 /// The faces of a cube from top to bottom.

@@ -91,6 +91,31 @@ fn a_folder_of_everything() {
 }
 
 #[test]
+fn one_file_for_one_engine() {
+    let folder = probes();
+    let base = ["ibl", "gray.exr", "--size", "16", "--json", "-o"];
+    for (name, engine, magic) in
+        [("a.ktx", "filament", &b"\xabKTX 11"[..]), ("a.env", "babylon", b"\x86\x16\x87\x96")]
+    {
+        let report = json(&domelight(&folder, &[&base[..], &[name]].concat()));
+        assert_eq!(report["engine"], engine);
+        assert!(fs::read(folder.path().join(name)).unwrap().starts_with(magic));
+        let other = [&base[..], &[name, "--for", "bevy"]].concat();
+        ended(&domelight(&folder, &other), 2, &["bevy", engine, ".ktx2"]);
+        let texels = [&base[..], &[name, "--texels", "half"]].concat();
+        ended(&domelight(&folder, &texels), 2, &["--texels"]);
+    }
+    // The brightest texel of an .env file is 255.
+    let bright = domelight(&folder, &["ibl", "sun.exr", "--size", "16", "-o", "b.env"]);
+    assert!(warning(&bright).contains("brighter than 255"), "{}", stderr(&bright));
+    ended(
+        &domelight(&folder, &["ibl", "gray.exr", "--size", "12", "-o", "c.env"]),
+        2,
+        &["--size", "12"],
+    );
+}
+
+#[test]
 fn suns_are_clipped_clamped_or_missed_with_a_warning() {
     let folder = probes();
     let with = |more: &[&str]| {
@@ -116,7 +141,7 @@ fn bad_input_leaves_no_file() {
     ended(&run(&["bad.exr", "-o", "a.ktx2", "--strict"]), 2, &["bad.exr", "--strict"]);
     let clipped = ["sun.exr", "--size", "16", "-o", "a.ktx2", "--strict"];
     ended(&run(&clipped), 2, &["brighter than 65408"]);
-    ended(&run(&["gray.exr", "-o", "a.png"]), 2, &[".ktx2 or .dds"]);
+    ended(&run(&["gray.exr", "-o", "a.png"]), 2, &[".ktx2, .dds, .ktx or .env"]);
     ended(&run(&["gray.exr", "-o", "a.ktx2", "--sun", "dim"]), 2, &["clamp:X"]);
     ended(&run(&["gray.exr", "-o", "a.ktx2", "--for", "quake"]), 2, &["filament"]);
     ended(&run(&["gray.exr", "-o", "a.ktx2", "--brdf", "a.ktx2"]), 2, &["a.ktx2"]);

@@ -1,11 +1,11 @@
 //! Prefiltered light for engines.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use domelight::picture::texture::{TexelFormat, Texture, dds, ktx2};
+use domelight::picture::texture::{ClippedLight, Container, RadianceFile, TexelFormat, Texture};
 use domelight::picture::write_atomically;
 use domelight::rig::ibl::{
-    self, BrdfTable, Cube, Engine, IblSettings, TableTerms, prefilter as prefiltered,
+    self, BrdfTable, Cube, Engine, IblSettings, SunTreatment, prefilter as prefiltered,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -14,10 +14,7 @@ use crate::arrays::{array, rows};
 use crate::engine::{parallel, parallel_on};
 use crate::environment::Environment;
 use crate::error::{bad_value, from_source, to_python, warn};
-
-/// The number of columns of a face of the irradiance cube, and of the table.
-const IRRADIANCE_SIZE: usize = 32;
-const TABLE_SIZE: usize = 128;
+use crate::rig::Rig;
 
 type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
 
@@ -29,7 +26,8 @@ type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
 pub(crate) struct PrefilteredLight {
     inner: ibl::PrefilteredLight,
     settings: IblSettings,
-    terms: TableTerms,
+    engine: Option<Engine>,
+    sun: Option<Rig>,
     name: String,
 }
 
@@ -39,39 +37,77 @@ fn cube<'py>(py: Python<'py>, cube: &Cube) -> PyResult<FloatArray<'py>> {
 }
 
 impl PrefilteredLight {
-    /// What a file holds, with a sentence if it lacks light.
-    fn texture(&self, content: &str, texels: &str) -> PyResult<(Texture, Option<String>)> {
-        let format = match texels {
-            "rgb9e5" => TexelFormat::SharedExponent,
-            "half" => TexelFormat::Half,
-            _ => {
-                return Err(bad_value(format!(
-                    "texels is {texels:?}; it must be 'rgb9e5' or 'half'"
-                )));
+    /// A sentence if a file lacks light.
+    fn loss(&self, clipped: ClippedLight, largest: f32) -> Option<String> {
+        (clipped.texels > 0).then(|| {
+            format!(
+                "{}: {} texels are brighter than {largest}, the most that the format holds, and are clipped: level 0 loses \
+                 {:.2} % of its light",
+                self.name,
+                clipped.texels,
+                100.0 * clipped.lost
+            )
+        })
+    }
+
+    /// Writes the radiance, and says what the file lacks.
+    fn save_radiance(&self, path: &Path, texels: TexelFormat) -> PyResult<Option<String>> {
+        let known = "its name must end in .ktx2, .dds, .ktx or .env";
+        let file = RadianceFile::of_extension(&extension(path), texels)
+            .ok_or_else(|| bad_value(format!("{}: {known}", path.display())))?;
+        file.check(self.settings.size).map_err(|e| from_source(&e))?;
+        if let Some(engine) = file.engine().filter(|&engine| self.engine != Some(engine)) {
+            let (path, name) = (path.display(), engine.name());
+            let text = format!("{path}: such files are for {name}; prefilter with engine='{name}'");
+            return Err(bad_value(text));
+        }
+        write_atomically(path, |out| file.encode(&self.inner, out)).map_err(to_python)?;
+        Ok(self.loss(file.clipped(&self.inner), file.largest()))
+    }
+
+    /// Writes a texture, and says what it lacks.
+    fn save_texture(
+        &self,
+        path: &Path,
+        content: &str,
+        texels: TexelFormat,
+    ) -> PyResult<Option<String>> {
+        let container = Container::of_extension(&extension(path)).ok_or_else(|| {
+            bad_value(format!("{}: its name must end in .ktx2 or .dds", path.display()))
+        })?;
+        let (texture, loss) = match content {
+            "irradiance" => {
+                let (texture, clipped) =
+                    Texture::cube(std::slice::from_ref(&self.inner.irradiance), texels);
+                (texture, self.loss(clipped, texels.largest()))
             }
-        };
-        let levels = match content {
-            "radiance" => &self.inner.levels[..],
-            "irradiance" => std::slice::from_ref(&self.inner.irradiance),
-            "brdf" => return Ok((Texture::table(&BrdfTable::new(TABLE_SIZE, self.terms)), None)),
+            "brdf" => {
+                let table = BrdfTable::new(BrdfTable::SIZE, Engine::terms(self.engine));
+                (Texture::table(&table), None)
+            }
             _ => {
                 return Err(bad_value(format!(
                     "content is {content:?}; it must be 'radiance', 'irradiance' or 'brdf'"
                 )));
             }
         };
-        let (texture, clipped) = Texture::cube(levels, format);
-        let loss = (clipped.texels > 0).then(|| {
-            format!(
-                "{}: {} texels are brighter than {}, the most that the format holds, and are clipped: level 0 loses {:.2} % of \
-                 its light",
-                self.name,
-                clipped.texels,
-                format.largest(),
-                100.0 * clipped.lost
-            )
-        });
-        Ok((texture, loss))
+        write_atomically(path, |out| container.encode(&texture, out)).map_err(to_python)?;
+        Ok(loss)
+    }
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn texel_format(texels: &str) -> PyResult<TexelFormat> {
+    match texels {
+        "rgb9e5" => Ok(TexelFormat::SharedExponent),
+        "half" => Ok(TexelFormat::Half),
+        _ => {
+            let text = format!("texels is {texels:?}; it must be 'rgb9e5' or 'half'");
+            Err(bad_value(text))
+        }
     }
 }
 
@@ -103,6 +139,12 @@ impl PrefilteredLight {
         rows(py, coefficients.iter().map(|c| c.to_array()).collect(), &[9])
     }
 
+    /// Rig or None: the sun that was taken out of the map.
+    #[getter]
+    fn sun(&self) -> Option<Rig> {
+        self.sun.clone()
+    }
+
     /// ndarray, shape (3, 3): the world directions that the cubes show at +X, +Y and +Z.
     #[getter]
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
@@ -128,7 +170,7 @@ impl PrefilteredLight {
                 IblSettings::MAX_SIZE
             )));
         }
-        let table = parallel(py, || BrdfTable::new(size, self.terms))?;
+        let table = parallel(py, || BrdfTable::new(size, Engine::terms(self.engine)))?;
         array(py, table.texels.into_flattened(), &[size, size, 2])
     }
 
@@ -137,7 +179,8 @@ impl PrefilteredLight {
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
-    ///     The file; its name ends in .ktx2 or .dds.
+    ///     The file; its name ends in .ktx2 or .dds. Radiance prefiltered for 'filament' may also become a .ktx file, and that
+    ///     for 'babylon' an .env file, which have a format of texels of their own and hold the irradiance, too.
     /// content : {'radiance', 'irradiance', 'brdf'}, default 'radiance'
     ///     All levels, irradiance over pi, or the table of the BRDF.
     /// texels : {'rgb9e5', 'half'}, default 'rgb9e5'
@@ -150,18 +193,12 @@ impl PrefilteredLight {
     #[pyo3(signature = (path, content = "radiance", *, texels = "rgb9e5"),
         text_signature = "($self, path, content='radiance', *, texels='rgb9e5')")]
     fn save(&self, py: Python<'_>, path: PathBuf, content: &str, texels: &str) -> PyResult<()> {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let encode = match extension.as_deref() {
-            Some("ktx2") => ktx2::encode,
-            Some("dds") => dds::encode,
-            _ => {
-                let path = path.display();
-                return Err(bad_value(format!("{path}: its name must end in .ktx2 or .dds")));
-            }
-        };
-        let (texture, loss) = parallel(py, || self.texture(content, texels))??;
-        warn(py, loss.as_slice())?;
-        parallel(py, || write_atomically(&path, |out| encode(&texture, out)).map_err(to_python))?
+        let texels = texel_format(texels)?;
+        let loss = parallel(py, || match content {
+            "radiance" => self.save_radiance(&path, texels),
+            _ => self.save_texture(&path, content, texels),
+        })??;
+        warn(py, loss.as_slice())
     }
 
     fn __repr__(&self) -> String {
@@ -172,8 +209,7 @@ impl PrefilteredLight {
 
 /// Prefilter an environment for image-based lighting by a split sum, as `domelight ibl` does.
 ///
-/// Every texel is the integral over the whole map, so a small sun leaves neither fireflies nor rings. To light a scene by
-/// the sun itself, prefilter `lights(env, None, sun=True).residual`.
+/// Every texel is the integral over the whole map, so a small sun leaves neither fireflies nor rings.
 ///
 /// Parameters
 /// ----------
@@ -184,6 +220,9 @@ impl PrefilteredLight {
 /// engine : {'three', 'filament', 'babylon', 'godot', 'bevy', 'unreal'}, optional
 ///     Decides how the cubes stand, the roughness of each level and the terms of the table. By default, cubes are looked up with
 ///     the world direction, and the roughness is level / (levels - 1).
+/// sun : str, default 'keep'
+///     'keep', 'remove' or 'clamp:X'. A sun that is removed is `PrefilteredLight.sun`, for an engine that lights the scene by
+///     it. 'clamp:100' scales every texel until its brightest channel is at most 100.
 /// threads : int, optional
 ///     By default the cores available to the process. The light does not depend on it.
 ///
@@ -195,28 +234,30 @@ impl PrefilteredLight {
 /// Raises
 /// ------
 /// ValueError
-///     If the map is black, the size is out of range, or the engine is unknown.
+///     If the map is black or has no sun to remove, the size is out of range, or the engine is unknown.
 #[pyfunction]
-#[pyo3(signature = (env, size = 256, *, engine = None, threads = None),
-    text_signature = "(env, size=256, *, engine=None, threads=None)")]
+#[pyo3(signature = (env, size = 256, *, engine = None, sun = "keep", threads = None),
+    text_signature = "(env, size=256, *, engine=None, sun='keep', threads=None)")]
 pub(crate) fn prefilter(
     env: &Bound<'_, Environment>,
     size: usize,
     engine: Option<&str>,
+    sun: &str,
     threads: Option<usize>,
 ) -> PyResult<PrefilteredLight> {
     let engine: Option<Engine> = engine.map(str::parse).transpose().map_err(|e| from_source(&e))?;
-    let linear = IblSettings::linear(size);
-    let settings = match engine {
-        None => linear,
-        Some(engine) => {
-            IblSettings { roughness: engine.roughness(size), axes: engine.axes(), ..linear }
-        }
-    };
-    let settings = IblSettings { irradiance_size: IRRADIANCE_SIZE.min(size), ..settings };
+    let sun: SunTreatment = sun.parse().map_err(|e| from_source(&e))?;
+    let settings = IblSettings::for_engine(engine, size);
     let Environment { inner, name } = env.get();
-    let light = parallel_on(env.py(), threads, || prefiltered(inner, &settings))?;
-    let inner = light.map_err(|e| from_source(&e))?;
-    let terms = engine.map_or(TableTerms::ScaleAndBias, Engine::table);
-    Ok(PrefilteredLight { inner, settings, terms, name: name.clone() })
+    let (inner, clamped, sun) = parallel_on(env.py(), threads, || {
+        let treated = sun.apply(inner).map_err(|e| from_source(&e))?;
+        let light = prefiltered(&treated.environment, &settings).map_err(|e| from_source(&e))?;
+        let of = |sun| Rig::without_residual(sun, inner.orientation(), name.clone());
+        PyResult::Ok((light, treated.clamped, treated.sun.map(of)))
+    })??;
+    if clamped > 0.0 {
+        let text = format!("{name}: clamping takes {:.2} % of the light", 100.0 * clamped);
+        warn(env.py(), &[text])?;
+    }
+    Ok(PrefilteredLight { inner, settings, engine, sun, name: name.clone() })
 }

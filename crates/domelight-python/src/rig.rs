@@ -31,6 +31,7 @@ use crate::picture::{Format as PictureFormat, depth, to_png, tone, write_image};
 ///
 /// Compact sources come first; each kind is sorted by decreasing luminance.
 #[pyclass(frozen, module = "domelight")]
+#[derive(Clone)]
 pub(crate) struct Rig {
     inner: rig::Rig,
     residual: Option<Arc<environment::Environment>>,
@@ -41,6 +42,15 @@ pub(crate) struct Rig {
 type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
 
 impl Rig {
+    /// Lights whose residual is not kept.
+    pub(crate) fn without_residual(
+        inner: rig::Rig,
+        orientation: Orientation,
+        name: String,
+    ) -> Self {
+        Self { inner, residual: None, orientation, name }
+    }
+
     fn numbers<'py>(
         &self,
         py: Python<'py>,

@@ -53,6 +53,36 @@ def test_files_are_those_of_the_arrays(env, tmp_path: pathlib.Path):
     np.testing.assert_allclose(again.power, env.power, rtol=0.02)
 
 
+def test_a_sun_is_removed_or_clamped():
+    texels = np.full((32, 64, 3), 0.5, np.float32)
+    texels[10, 40] = 1e5
+    env = dl.Environment(texels)
+    removed = dl.prefilter(env, 8, sun="remove")
+    assert removed.sun is not None and len(removed.sun) == 1 and removed.sun.names == ["sun"]
+    np.testing.assert_allclose(removed.levels[-1], 0.5, rtol=0.01)
+    with pytest.warns(dl.DomelightWarning, match="clamping takes"):
+        clamped = dl.prefilter(env, 8, sun="clamp:0.5")
+    assert clamped.sun is None
+    np.testing.assert_allclose(clamped.levels[-1], 0.5, rtol=0.01)
+    with pytest.raises(ValueError, match="sun"):
+        dl.prefilter(dl.Environment(np.full((4, 8, 3), 0.5)), 4, sun="remove")
+    with pytest.raises(ValueError, match="clamp:X"):
+        dl.prefilter(env, 4, sun="dim")
+
+
+def test_files_of_one_engine(env, tmp_path: pathlib.Path):
+    for name, engine, magic in [
+        ("a.ktx", "filament", b"\xabKTX 11"),
+        ("a.env", "babylon", b"\x86\x16\x87\x96"),
+    ]:
+        dl.prefilter(env, 16, engine=engine).save(tmp_path / name)
+        assert (tmp_path / name).read_bytes().startswith(magic)
+        with pytest.raises(ValueError, match=f"engine='{engine}'"):
+            dl.prefilter(env, 4).save(tmp_path / name)
+    with pytest.raises(ValueError, match="not 12"):
+        dl.prefilter(env, 12, engine="babylon").save(tmp_path / "b.env")
+
+
 def test_bad_requests(env, tmp_path: pathlib.Path):
     with pytest.raises(ValueError, match="black"):
         dl.prefilter(dl.Environment(np.zeros((2, 4, 3))))

@@ -1,14 +1,16 @@
 //! The arguments of `domelight ibl`.
 
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::builder::TypedValueParser;
 use clap::{Args, ValueEnum};
-use domelight::picture::texture::TexelFormat;
-use domelight::rig::ibl::{Engine, IblSettings};
+use domelight::picture::texture::{Container, RadianceFile, TexelFormat};
+use domelight::rig::ibl::{Engine, IblSettings, SunTreatment};
 
-use super::{one_of, positive};
+use super::one_of;
+use crate::error::UsageError;
 use domelight_lab::job::Light;
 
 pub(super) const EXAMPLES: &str = "\
@@ -19,6 +21,8 @@ Examples:
       a cube whose levels are filtered for Bevy's roughness, as RGB9E5
   domelight ibl road.hdr -o road.dds --texels half --irradiance road_irradiance.dds
       the same as DDS in half precision, and the cube of diffuse light
+  domelight ibl studio.hdr -o studio.env
+      one file for Babylon.js; studio.ktx is one for Filament
   domelight ibl road.hdr -o road/ --sun remove
       a folder with everything, without the sun, which becomes a light of its own: domelight lights --sun";
 
@@ -28,8 +32,9 @@ pub(crate) struct IblArguments {
     #[command(flatten)]
     pub(crate) light: Light,
 
-    /// Output: .ktx2 or .dds, a cube with a level for each roughness; or a folder, whose name ends in /, for it and the
-    /// irradiance, the table and OpenEXR pictures of all levels
+    /// Output: .ktx2 or .dds, a cube with a level for each roughness; .ktx for Filament or .env for Babylon.js, the same with
+    /// the irradiance; or a folder, whose name ends in /, for the cube, the irradiance, the table and OpenEXR pictures of all
+    /// levels
     #[arg(short, long, value_name = "OUT", help_heading = "Output")]
     pub(crate) output: IblPath,
     /// Write the irradiance over π as a cube (.ktx2, .dds)
@@ -59,9 +64,9 @@ pub(crate) struct IblArguments {
         help_heading = "Prefiltered light"
     )]
     pub(crate) sun: SunTreatment,
-    /// Format of the cubes' texels
-    #[arg(long, value_enum, default_value_t = Texels::Rgb9e5, help_heading = "Prefiltered light")]
-    pub(crate) texels: Texels,
+    /// Format of the texels in .ktx2 and .dds [default: rgb9e5]
+    #[arg(long, value_enum, help_heading = "Prefiltered light")]
+    pub(crate) texels: Option<Texels>,
 }
 
 fn engine() -> impl TypedValueParser<Value = Engine> {
@@ -77,6 +82,8 @@ pub(crate) enum Texels {
     Half,
 }
 
+const TEXELS: Texels = Texels::Rgb9e5;
+
 impl From<Texels> for TexelFormat {
     fn from(texels: Texels) -> Self {
         match texels {
@@ -84,35 +91,6 @@ impl From<Texels> for TexelFormat {
             Texels::Half => Self::Half,
         }
     }
-}
-
-/// What happens to the sun before the map is filtered.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum SunTreatment {
-    Keep,
-    Remove,
-    /// The brightest channel of every texel is at most this.
-    Clamp(f32),
-}
-
-impl FromStr for SunTreatment {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match (text, text.strip_prefix("clamp:")) {
-            ("keep", _) => Ok(Self::Keep),
-            ("remove", _) => Ok(Self::Remove),
-            (_, Some(radiance)) => positive(radiance).map(Self::Clamp),
-            _ => Err("not keep, remove or clamp:X, such as clamp:100".into()),
-        }
-    }
-}
-
-/// The container of a texture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Container {
-    Ktx2,
-    Dds,
 }
 
 /// A texture file to write.
@@ -127,12 +105,8 @@ impl FromStr for TexturePath {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let path = PathBuf::from(text);
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let container = match extension.as_deref() {
-            Some("ktx2") => Container::Ktx2,
-            Some("dds") => Container::Dds,
-            _ => return Err("its name must end in .ktx2 or .dds".into()),
-        };
+        let container = extension(&path).and_then(|e| Container::of_extension(&e));
+        let container = container.ok_or("its name must end in .ktx2 or .dds")?;
         Ok(Self { path, container })
     }
 }
@@ -140,7 +114,7 @@ impl FromStr for TexturePath {
 /// Where prefiltered light goes.
 #[derive(Clone, Debug)]
 pub(crate) enum IblPath {
-    File(TexturePath),
+    File(PathBuf),
     Folder(PathBuf),
 }
 
@@ -148,12 +122,54 @@ impl FromStr for IblPath {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let is_folder =
-            text.ends_with(std::path::is_separator) || std::path::Path::new(text).is_dir();
-        if is_folder {
-            return Ok(Self::Folder(PathBuf::from(text)));
+        let path = PathBuf::from(text);
+        if text.ends_with(std::path::is_separator) || path.is_dir() {
+            return Ok(Self::Folder(path));
         }
-        let file = text.parse().map(Self::File);
-        file.map_err(|_| "its name must end in .ktx2 or .dds, or in / for a folder".into())
+        let format = extension(&path).and_then(|e| RadianceFile::of_extension(&e, TEXELS.into()));
+        let known = "its name must end in .ktx2, .dds, .ktx or .env, or in / for a folder";
+        format.map(|_| Self::File(path)).ok_or_else(|| known.into())
+    }
+}
+
+fn extension(path: &Path) -> Option<Cow<'_, str>> {
+    path.extension().map(std::ffi::OsStr::to_string_lossy)
+}
+
+impl IblArguments {
+    /// The format of the texels of cubes.
+    pub(crate) fn texel_format(&self) -> TexelFormat {
+        self.texels.unwrap_or(TEXELS).into()
+    }
+
+    /// The format of the radiance.
+    pub(crate) fn radiance_file(&self) -> RadianceFile {
+        let texels = self.texel_format();
+        let of = |path: &PathBuf| RadianceFile::of_extension(&extension(path)?, texels);
+        let file = match &self.output {
+            IblPath::File(path) => of(path),
+            IblPath::Folder(_) => None,
+        };
+        file.unwrap_or(RadianceFile::Texture(Container::Ktx2, texels))
+    }
+
+    /// The engine that the files are for, which the format of the radiance may decide.
+    pub(crate) fn target(&self) -> Result<Option<Engine>, UsageError> {
+        let file = self.radiance_file();
+        file.check(self.size as usize).map_err(|error| UsageError(format!("--size: {error}")))?;
+        let Some(only) = file.engine() else { return Ok(self.engine) };
+        match self.engine {
+            Some(other) if other != only => {
+                let text =
+                    format!("{} reads other files than those of {}", other.name(), only.name());
+                Err(UsageError(format!("--for {}: {text}; write .ktx2 or .dds", other.name())))
+            }
+            Some(_) | None if self.texels.is_some() => {
+                let text =
+                    "--texels is for .ktx2 and .dds; other files have their own format of texels";
+                Err(UsageError(text.into()))
+            }
+            Some(_) | None => Ok(Some(only)),
+        }
     }
 }

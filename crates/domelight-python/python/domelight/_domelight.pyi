@@ -275,6 +275,8 @@ class PrefilteredLight:
     def harmonics(self) -> _Floats: ...
     @property
     def axes(self) -> _Floats: ...
+    @property
+    def sun(self) -> Rig | None: ...
     def brdf(self, size: int = 128) -> _Floats: ...
     def save(
         self, path: _Path, content: Content = "radiance", *, texels: Texels = "rgb9e5"
@@ -314,6 +316,7 @@ def render(
     tile_size: int | None,
     time: float | None,
     progress: Callable[[float], object] | None,
+    display: bool | str,
 ) -> Film: ...
 def progressive(
     scene: Scene,
@@ -359,7 +362,12 @@ def lights(
     threads: int | None = None,
 ) -> Rig: ...
 def prefilter(
-    env: Environment, size: int = 256, *, engine: Engine | None = None, threads: int | None = None
+    env: Environment,
+    size: int = 256,
+    *,
+    engine: Engine | None = None,
+    sun: str = "keep",
+    threads: int | None = None,
 ) -> PrefilteredLight: ...
 def read(path: _Path, *, layer: str | None = None) -> _Floats: ...
 def write(

@@ -33,6 +33,8 @@ pub enum Convention {
     Unity,
     /// Godot's panorama sky.
     Godot,
+    /// Filament's `cmgen`.
+    Filament,
     /// A Radiance source with a lat-long picture, as domelight writes it.
     Radiance,
     /// nvdiffrec and nvdiffrecmc.
@@ -81,7 +83,7 @@ pub struct Indivisible {
 
 impl Convention {
     /// All programs.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Blender,
         Self::Mitsuba,
         Self::Pbrt,
@@ -92,6 +94,7 @@ impl Convention {
         Self::Unreal,
         Self::Unity,
         Self::Godot,
+        Self::Filament,
         Self::Radiance,
         Self::Nvdiffrec,
     ];
@@ -109,6 +112,7 @@ impl Convention {
             Self::Unreal => "unreal",
             Self::Unity => "unity",
             Self::Godot => "godot",
+            Self::Filament => "filament",
             Self::Radiance => "radiance",
             Self::Nvdiffrec => "nvdiffrec",
         }
@@ -125,7 +129,7 @@ impl Convention {
         match self {
             Self::Unreal | Self::Radiance | Self::Nvdiffrec => 0,
             Self::Pbrt | Self::Unity => 1,
-            Self::Mitsuba | Self::Usd | Self::Babylon | Self::Godot => 2,
+            Self::Mitsuba | Self::Usd | Self::Babylon | Self::Godot | Self::Filament => 2,
             Self::Blender | Self::Gltf | Self::Three => 3,
         }
     }
@@ -143,6 +147,7 @@ impl Convention {
             | Self::Unreal
             | Self::Unity
             | Self::Godot
+            | Self::Filament
             | Self::Radiance
             | Self::Nvdiffrec => false,
         }
@@ -153,7 +158,7 @@ impl Convention {
     pub fn look_up(self) -> &'static str {
         match self {
             Self::Blender => "½ − atan2(y, x)/2π, z up",
-            Self::Mitsuba | Self::Godot => "atan2(x, −z)/2π, y up",
+            Self::Mitsuba | Self::Godot | Self::Filament => "atan2(x, −z)/2π, y up",
             Self::Pbrt => "atan2(y, x)/2π, z up",
             Self::Usd => "¼ + atan2(z, x)/2π, y up",
             Self::Gltf | Self::Three => "½ + atan2(z, x)/2π, y up",
@@ -169,7 +174,7 @@ impl Convention {
     pub fn center(self) -> &'static str {
         match self {
             Self::Blender | Self::Gltf | Self::Three | Self::Unity => "+X",
-            Self::Mitsuba | Self::Usd | Self::Babylon | Self::Godot => "+Z",
+            Self::Mitsuba | Self::Usd | Self::Babylon | Self::Godot | Self::Filament => "+Z",
             Self::Pbrt => "−X",
             Self::Radiance => "+Y",
             Self::Unreal => "−Y",
@@ -190,6 +195,7 @@ impl Convention {
             Self::Unreal => "TextureCompressorModule.cpp; its importers exchange y and z",
             Self::Unity => "Skybox-Panoramic.shader; glTF exporters negate x",
             Self::Godot => "sky.glsl",
+            Self::Filament => "cmgen's cubes",
             Self::Radiance => "the brightness function that domelight writes",
             Self::Nvdiffrec => "render/util.py, cubemap_to_latlong",
         }
@@ -198,9 +204,12 @@ impl Convention {
     /// What the statement rests on.
     pub fn proof(self) -> Proof {
         match self {
-            Self::Blender | Self::Mitsuba | Self::Three | Self::Babylon | Self::Radiance => {
-                Proof::Program
-            }
+            Self::Blender
+            | Self::Mitsuba
+            | Self::Three
+            | Self::Babylon
+            | Self::Filament
+            | Self::Radiance => Proof::Program,
             Self::Pbrt | Self::Usd => Proof::Format,
             Self::Gltf | Self::Unreal | Self::Unity | Self::Godot | Self::Nvdiffrec => {
                 Proof::Source
@@ -359,7 +368,7 @@ mod tests {
         let Vec3 { x, y, z } = d;
         match convention {
             Convention::Blender => 0.5 - y.atan2(x) / TAU,
-            Convention::Mitsuba | Convention::Godot => x.atan2(-z) / TAU,
+            Convention::Mitsuba | Convention::Godot | Convention::Filament => x.atan2(-z) / TAU,
             Convention::Pbrt => y.atan2(x) / TAU,
             Convention::Usd => 0.25 + z.atan2(x) / TAU,
             Convention::Gltf | Convention::Three => 0.5 + z.atan2(x) / TAU,

@@ -73,6 +73,15 @@ impl SphericalHarmonics {
         Self { coefficients: self.irradiance_coefficients() }.radiance(normal)
     }
 
+    /// Irradiance over π \[W·m⁻²·sr⁻¹\] as a polynomial of the normal: the factors of 1, y, z, x, xy, yz, 3z² − 1, xz and
+    /// x² − y².
+    pub fn irradiance_polynomial(&self) -> [Rgb; 9] {
+        let [y0, y1, y2, y20, y22] = normalizations();
+        let y = [y0, y1, y1, y1, y2, y2, y20, y2, y22];
+        let coefficients = self.irradiance_coefficients();
+        std::array::from_fn(|i| coefficients[i].map(|c| (f64::from(c) * y[i] / PI) as f32))
+    }
+
     /// Â_l L_lm: the coefficients of irradiance as a function of the normal, in the same basis
     /// \[W·m⁻²\].
     pub fn irradiance_coefficients(&self) -> [Rgb; 9] {
@@ -89,6 +98,11 @@ fn basis(w: Vec3) -> [f32; 9] {
     harmonics(1.0, [x, y, z], [xx, yy, zz], [x * y, y * z, x * z]).map(|y| y as f32)
 }
 
+/// The constants of Y_0, of Y_1 to Y_3, of Y_4, Y_5 and Y_7, of Y_6, and of Y_8.
+fn normalizations() -> [f64; 5] {
+    [1.0, 3.0, 15.0, 1.25, 3.75].map(|c| (c / (4.0 * PI)).sqrt())
+}
+
 /// The harmonics from ∫ L, ∫ L (x, y, z), ∫ L (x², y², z²) and ∫ L (xy, yz, xz).
 pub(super) fn harmonics(
     sum: f64,
@@ -96,8 +110,7 @@ pub(super) fn harmonics(
     squares: [f64; 3],
     products: [f64; 3],
 ) -> [f64; 9] {
-    let [y0, y1] = [(1.0 / (4.0 * PI)).sqrt(), (3.0 / (4.0 * PI)).sqrt()];
-    let [y2, y20, y22] = [15.0 / (4.0 * PI), 5.0 / (16.0 * PI), 15.0 / (16.0 * PI)].map(f64::sqrt);
+    let [y0, y1, y2, y20, y22] = normalizations();
     let ([x, y, z], [xx, yy, zz], [xy, yz, xz]) = (first, squares, products);
     [
         y0 * sum,
@@ -289,6 +302,21 @@ mod tests {
         let [coarse, fine] = [coarse, fine].map(|map| SphericalHarmonics::project(&of(map)));
         for (c, f) in coarse.coefficients.iter().zip(fine.coefficients) {
             assert!((c.g - f.g).abs() < 1e-6, "{c:?} {f:?}");
+        }
+    }
+
+    #[test]
+    fn the_polynomial_is_irradiance_over_pi() {
+        let mut pcg = Pcg32::new(5, 1);
+        let coefficients = [0; 9].map(|_| Rgb::from([0; 3].map(|_| pcg.next_f32() - 0.5)));
+        let harmonics = SphericalHarmonics { coefficients };
+        for n in directions() {
+            let Vec3 { x, y, z } = n;
+            let terms = [1.0, y, z, x, x * y, y * z, 3.0 * z * z - 1.0, x * z, x * x - y * y];
+            let sum: Rgb =
+                harmonics.irradiance_polynomial().into_iter().zip(terms).map(|(c, t)| c * t).sum();
+            let off = (sum * PI as f32 - harmonics.irradiance(n)).map(f32::abs);
+            assert!(off.max_component() < 1e-5, "{n}");
         }
     }
 

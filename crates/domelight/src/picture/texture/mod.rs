@@ -1,15 +1,26 @@
 //! Textures as graphics interfaces take them: cubes with a chain of levels and tables, in KTX2 and DDS files.
 //!
-//! Of cubes, the first level is read: radiance in RGB9E5, half or single precision.
+//! Of cubes, the first level is read: radiance in RGB9E5, half or single precision. Prefiltered light is also written in the
+//! files of two engines ([`RadianceFile`]).
 
+#[cfg(feature = "io")]
+mod babylon;
 pub mod dds;
 mod faces;
+#[cfg(feature = "io")]
+mod ktx1;
 pub mod ktx2;
+#[cfg(feature = "io")]
+mod radiance;
 mod read;
 
 pub use faces::TextureErrorKind;
 use faces::{FaceBytes, check_cube, long, word};
-pub(super) use read::{Container, decode, texels};
+#[cfg(feature = "io")]
+pub use radiance::{RadianceFile, RadianceFileError};
+pub(super) use read::{decode, texels};
+
+use std::io::{self, Write};
 
 use half::f16;
 
@@ -54,6 +65,37 @@ impl TexelFormat {
     }
 }
 
+/// A file format of textures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Container {
+    /// KTX 2.0.
+    Ktx2,
+    /// DDS.
+    Dds,
+}
+
+impl Container {
+    /// The format whose files have this extension, in any case.
+    pub fn of_extension(extension: &str) -> Option<Self> {
+        match extension.to_ascii_lowercase().as_str() {
+            "ktx2" => Some(Self::Ktx2),
+            "dds" => Some(Self::Dds),
+            _ => None,
+        }
+    }
+
+    /// Writes a texture. Every texture of at least one level can be written.
+    ///
+    /// # Errors
+    /// If writing to `out` fails.
+    pub fn encode(self, texture: &Texture, out: &mut dyn Write) -> io::Result<()> {
+        match self {
+            Self::Ktx2 => ktx2::encode(texture, out),
+            Self::Dds => dds::encode(texture, out),
+        }
+    }
+}
+
 /// A texture, or a cube of six squares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
@@ -79,14 +121,11 @@ pub struct ClippedLight {
 impl Texture {
     /// The levels of a cube, and what was clipped. Negative and NaN channels become 0.
     pub fn cube(levels: &[Cube], format: TexelFormat) -> (Self, ClippedLight) {
-        let largest = format.largest();
-        let is_clipped = |texel: &&Rgb| texel.max_component() > largest;
-        let texels = levels.iter().flat_map(|cube| &cube.texels).filter(is_clipped).count();
-        let lost = levels.first().map_or(0.0, |cube| lost_light(cube, largest));
+        let clipped = ClippedLight::of(levels, format.largest());
         let encode = |cube: &Cube| cube.texels.iter().flat_map(|&t| encode(format, t)).collect();
         let size = [levels.first().map_or(0, |cube| cube.size); 2];
         let levels = levels.iter().map(encode).collect();
-        (Self { size, faces: 6, format, levels }, ClippedLight { texels, lost })
+        (Self { size, faces: 6, format, levels }, clipped)
     }
 
     /// A table of the BRDF, as pairs of half precision.
@@ -108,6 +147,16 @@ impl Texture {
     /// The number of texels of a face of a level.
     fn texels(&self, level: usize) -> usize {
         self.size.map(|n| (n >> level).max(1)).iter().product()
+    }
+}
+
+impl ClippedLight {
+    /// What a format clips whose channels are at most `largest`.
+    fn of(levels: &[Cube], largest: f32) -> Self {
+        let is_clipped = |texel: &&Rgb| texel.max_component() > largest;
+        let texels = levels.iter().flat_map(|cube| &cube.texels).filter(is_clipped).count();
+        let lost = levels.first().map_or(0.0, |cube| lost_light(cube, largest));
+        Self { texels, lost }
     }
 }
 

@@ -1,18 +1,9 @@
 //! The first level of a cube texture as a picture.
 
-use super::{dds, ktx2};
+use super::{Container, dds, ktx2};
 use crate::environment::mapping::{CubeLayout, EnvmapKind, Mapping};
 use crate::picture::{Format, Picture, PictureErrorKind, allocate, checked_area};
 use crate::{Rgb, RgbImage};
-
-/// A file format of textures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::picture) enum Container {
-    /// KTX 2.0.
-    Ktx2,
-    /// DDS.
-    Dds,
-}
 
 /// The number of texels of the picture, by the header alone.
 pub(in crate::picture) fn texels(

@@ -31,6 +31,9 @@ pub struct BrdfTable {
 }
 
 impl BrdfTable {
+    /// The usual number of columns.
+    pub const SIZE: usize = 128;
+
     /// Computes a table of `size` × `size` texels.
     pub fn new(size: usize, terms: TableTerms) -> Self {
         let at = |i: usize| (i as f64 + 0.5) / size as f64;

@@ -29,7 +29,7 @@ pub enum Engine {
 const FILAMENT_SMALLEST: usize = 16;
 
 /// `lodGenerationScale` of Babylon.js: levels per octave of α.
-const BABYLON_SCALE: f32 = 0.8;
+pub(crate) const BABYLON_SCALE: f32 = 0.8;
 
 /// `REFLECTION_CAPTURE_ROUGHNESS_MIP_SCALE` of Unreal: levels per octave of r.
 const UNREAL_SCALE: f32 = 1.2;
@@ -37,6 +37,12 @@ const UNREAL_SCALE: f32 = 1.2;
 /// The roughness of levels 0 to `last`: of a mirror, then `rough`, up to 1.
 fn with_mirror(last: u32, rough: impl Fn(u32) -> f32) -> Vec<f32> {
     (0..=last).map(|level| if level == 0 { 0.0 } else { rough(level).min(1.0) }).collect()
+}
+
+/// A full chain of levels down to a single texel, with the roughness level / (levels − 1).
+pub(super) fn linear_roughness(size: usize) -> Vec<f32> {
+    let last = size.max(1).ilog2();
+    (0..=last).map(|level| level as f32 / last.max(1) as f32).collect()
 }
 
 impl Engine {
@@ -77,9 +83,7 @@ impl Engine {
     pub fn roughness(self, size: usize) -> Vec<f32> {
         let last = size.max(1).ilog2();
         match self {
-            Self::Three | Self::Godot | Self::Bevy => {
-                (0..=last).map(|level| level as f32 / last.max(1) as f32).collect()
-            }
+            Self::Three | Self::Godot | Self::Bevy => linear_roughness(size),
             // The shader looks up level r (2 − r) · last.
             Self::Filament => {
                 let last = (size / FILAMENT_SMALLEST).max(1).ilog2();
@@ -97,6 +101,14 @@ impl Engine {
                 let from_rough = |level: u32| level as f32 + 1.0 - last as f32;
                 with_mirror(last, |level| functions::exp2(from_rough(level) / UNREAL_SCALE))
             }
+        }
+    }
+
+    /// What an engine's table of the BRDF holds; without an engine, A and B.
+    pub const fn terms(engine: Option<Self>) -> TableTerms {
+        match engine {
+            Some(engine) => engine.table(),
+            None => TableTerms::ScaleAndBias,
         }
     }
 

@@ -19,10 +19,13 @@ mod cube;
 mod engine;
 mod gather;
 mod lobe;
+mod sun;
 
 pub use brdf::{BrdfTable, TableTerms, split_sum};
 pub use cube::{Cube, CubeAxes};
+pub(crate) use engine::BABYLON_SCALE;
 pub use engine::{Engine, UnknownEngine};
+pub use sun::{SunError, SunTreatment, TreatedEnvironment, UnknownSunTreatment};
 
 use super::pyramid::Pyramid;
 use super::spherical_harmonics::SphericalHarmonics;
@@ -52,11 +55,23 @@ impl IblSettings {
     /// The largest size of a cube's face.
     pub const MAX_SIZE: usize = 4096;
 
+    /// The number of columns of a face of the irradiance cube, which is smooth.
+    const IRRADIANCE_SIZE: usize = 32;
+
     /// A full chain of levels down to a single texel, with the roughness level / (levels − 1).
     pub fn linear(size: usize) -> Self {
-        let last = size.max(1).ilog2();
-        let roughness = (0..=last).map(|level| level as f32 / last.max(1) as f32).collect();
-        Self { size, roughness, irradiance_size: 32, axes: CubeAxes::WORLD }
+        let roughness = engine::linear_roughness(size);
+        let irradiance_size = Self::IRRADIANCE_SIZE.min(size);
+        Self { size, roughness, irradiance_size, axes: CubeAxes::WORLD }
+    }
+
+    /// The levels of an engine, in cubes that stand as the engine looks them up; without an engine,
+    /// [`IblSettings::linear`].
+    pub fn for_engine(engine: Option<Engine>, size: usize) -> Self {
+        let linear = Self::linear(size);
+        let of = |engine: Engine| (engine.roughness(size), engine.axes());
+        let (roughness, axes) = engine.map_or((linear.roughness, linear.axes), of);
+        Self { roughness, axes, ..Self::linear(size) }
     }
 }
 
