@@ -70,6 +70,7 @@ impl BenchArguments {
             most: self.most,
             errors: self.errors.clone(),
             vs: self.vs.map(|Peer::Mitsuba| bench::Peer::Mitsuba { python }),
+            programs: self.programs.clone(),
             embree: self.embree.clone(),
             reference_error: self.reference_error,
             cache: cache(self.no_cache, self.cache.as_deref(), host),
@@ -80,15 +81,18 @@ impl BenchArguments {
 
 /// Rejects options that the suite does not use.
 fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
-    use Suite::{Interiors, Kernels, Lecture, Probes, Rigs};
-    let BenchArguments { meshes, probes, materials, cases, strategies, vs, embree, .. } = arguments;
-    let given: [(&str, bool, &[Suite]); 7] = [
+    use Suite::{Felt, Interiors, Kernels, Lecture, Probes, Rigs};
+    let BenchArguments {
+        meshes, probes, materials, cases, strategies, vs, programs, embree, ..
+    } = arguments;
+    let given: [(&str, bool, &[Suite]); 8] = [
         ("--meshes", !meshes.is_empty(), &[Probes]),
         ("--probes", !probes.is_empty(), &[Probes, Interiors, Rigs]),
         ("--materials", materials.is_some(), &[Probes]),
         ("--case", !cases.is_empty(), &[Probes]),
         ("--strategies", !strategies.is_empty(), &[Probes, Lecture]),
         ("--vs", vs.is_some(), &[Probes]),
+        ("--program", !programs.is_empty(), &[Felt]),
         ("--embree", embree.is_some(), &[Kernels]),
     ];
     for (flag, given, suites) in given {

@@ -25,6 +25,8 @@ Examples:
       cases of your choice
   domelight bench --suite probes --strategies product,mis --vs mitsuba --python venv/bin/python
       the same pictures rendered by Mitsuba 3, in turns
+  domelight bench --suite felt --program domelight ./domelight-0.1
+      what people wait for, by two versions in turns
   domelight bench --suite rigs -o rigs.json && domelight bench --table rigs.json
       results as a file, and its tables as Markdown";
 
@@ -89,6 +91,9 @@ pub(crate) struct BenchArguments {
     /// Python interpreter that has the module mitsuba
     #[arg(long, value_name = "PROGRAM", default_value = "python3", help_heading = "Others")]
     pub(crate) python: PathBuf,
+    /// Programs that the suite felt measures in turns, such as an earlier version beside this one [default: this program]
+    #[arg(long = "program", value_name = "PROGRAM", num_args = 1.., help_heading = "Others")]
+    pub(crate) programs: Vec<PathBuf>,
     /// Embree 4, such as libembree4.so, as the peer of the suite kernels; loaded at run time
     #[arg(long, value_name = "LIBRARY", help_heading = "Others")]
     pub(crate) embree: Option<PathBuf>,

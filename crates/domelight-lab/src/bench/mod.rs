@@ -4,6 +4,7 @@ mod bench_run;
 mod bound;
 mod cases;
 mod embree;
+mod felt;
 mod fit;
 mod interiors;
 mod kernels;
@@ -39,6 +40,8 @@ pub enum Suite {
     Interiors,
     /// Light rigs: the time to extract them, and their shading error
     Rigs,
+    /// What people wait for: first pictures, large files, rigs, a comparison; by several versions in turns
+    Felt,
 }
 
 impl Suite {
@@ -87,6 +90,8 @@ pub struct BenchSettings {
     pub errors: Vec<f64>,
     /// Another renderer on the same cases.
     pub vs: Option<Peer>,
+    /// The programs that the suite `felt` measures in turns; by default, this one.
+    pub programs: Vec<PathBuf>,
     /// Embree 4's library, for the suite `kernels` to measure against.
     pub embree: Option<PathBuf>,
     /// The relMSE of converged pictures.
@@ -128,6 +133,7 @@ impl Bench<'_> {
             Rows::Probes(rows) => renders::run_probes(self, rows),
             Rows::Interiors(rows) => interiors::run(self, rows),
             Rows::Rigs(rows) => rigs::run(self, rows),
+            Rows::Felt(rows) => felt::run(self, rows),
         }
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::Suite;
 use super::machine::Machine;
 use super::table::Table;
-use super::{interiors, kernels, renders, rigs};
+use super::{felt, interiors, kernels, renders, rigs};
 use crate::{At as _, Error};
 
 /// Raised when a file of before can no longer be read.
@@ -42,6 +42,7 @@ pub(super) enum Rows {
     Probes(Vec<renders::Row>),
     Interiors(Vec<interiors::Row>),
     Rigs(Vec<rigs::Row>),
+    Felt(Vec<felt::Row>),
 }
 
 impl Results {
@@ -61,6 +62,7 @@ impl Results {
                 Suite::Probes => Rows::Probes(Vec::new()),
                 Suite::Interiors => Rows::Interiors(Vec::new()),
                 Suite::Rigs => Rows::Rigs(Vec::new()),
+                Suite::Felt => Rows::Felt(Vec::new()),
             },
         }
     }
@@ -119,6 +121,7 @@ impl Results {
             Rows::Kernels(rows) => kernels::tables(rows),
             Rows::Interiors(rows) => interiors::tables(rows),
             Rows::Rigs(rows) => rigs::tables(rows),
+            Rows::Felt(rows) => felt::tables(rows),
         }
     }
 }

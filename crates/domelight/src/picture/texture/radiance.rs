@@ -156,7 +156,7 @@ mod tests {
         for (i, face) in faces.iter().enumerate() {
             let number = |key: &str| face[key].as_u64().unwrap() as usize;
             let at = end + 1 + number("position");
-            let png = std::io::Cursor::new(&bytes[at..at + number("length")]);
+            let png = io::Cursor::new(&bytes[at..at + number("length")]);
             let mut reader = png::Decoder::new(png).read_info().unwrap();
             let mut texels = vec![0; reader.output_buffer_size().unwrap()];
             let info = reader.next_frame(&mut texels).unwrap();
