@@ -76,7 +76,8 @@ fn face(cube: &Cube, face: usize) -> io::Result<Vec<u8>> {
 
 /// Color over the largest divisor that keeps it at most 1.
 fn rgbd(texel: Rgb) -> [u8; 4] {
-    let texel = texel.map(|c| c.max(0.0).min(LARGEST));
+    // NaN becomes 0, too.
+    let texel = texel.map(|c| if c > 0.0 { c.min(LARGEST) } else { 0.0 });
     let divisor = (LARGEST / texel.max_component().max(1e-7)).clamp(1.0, 255.0).floor();
     let byte = |c: f32| {
         let display = functions::powf(f64::from((c * divisor / 255.0).min(1.0)), 1.0 / 2.2);

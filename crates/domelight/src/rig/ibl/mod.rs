@@ -23,6 +23,7 @@ mod sun;
 
 pub use brdf::{BrdfTable, TableTerms, split_sum};
 pub use cube::{Cube, CubeAxes};
+#[cfg(feature = "io")]
 pub(crate) use engine::BABYLON_SCALE;
 pub use engine::{Engine, UnknownEngine};
 pub use sun::{SunError, SunTreatment, TreatedEnvironment, UnknownSunTreatment};
