@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::rc::Rc;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use domelight::Rgb;
 use domelight::bsdf::{Bsdf, MaterialSpec};
@@ -18,9 +18,9 @@ use domelight::scene::{
     MaterialModel, Projection, Scene, SceneDescription, load_bytes,
 };
 use serde::{Deserialize, Serialize};
-use wasm_bindgen::prelude::*;
 
-use crate::{Engine, error};
+use crate::error::{error, refused};
+use crate::{Engine, Error};
 
 /// The most that a scene and its textures take: an instance of WebAssembly has 4 GiB at the most, and builds a
 /// hierarchy beside them \[bytes\].
@@ -29,11 +29,11 @@ const MAX_SCENE_MEMORY: u64 = 1 << 30;
 const MAX_PROBE_MEMORY: u64 = 1 << 30;
 
 /// The settings of [`Engine::load_scene`].
-#[derive(Clone, Default, Deserialize)]
+#[derive(Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub(crate) struct Setup {
+struct Setup {
     /// A built-in scene, or a file.
-    pub(crate) scene: String,
+    scene: String,
     /// The subject's, as `--material` has it; empty leaves what the scene brings.
     material: String,
     /// Single materials of the scene by their index, which the subject's leaves alone.
@@ -44,10 +44,10 @@ pub(crate) struct Setup {
 
 impl Setup {
     /// Replaces the materials that the settings name.
-    fn replace_materials(&self, description: &mut SceneDescription) -> Result<(), JsError> {
+    fn replace_materials(&self, description: &mut SceneDescription) -> Result<(), Error> {
         let parsed = |text: &str| {
             let material: MaterialSpec = text.parse().map_err(error)?;
-            Ok::<_, JsError>(Bsdf::from(material))
+            Ok::<_, Error>(Bsdf::from(material))
         };
         let n = description.materials.len();
         let own: Vec<usize> = description.parts.iter().map(|part| part.material).collect();
@@ -55,7 +55,7 @@ impl Setup {
             description.set_subject_material(parsed(&self.material)?);
         }
         for (&index, text) in &self.materials {
-            let missing = || JsError::new(&format!("material {index}: the scene has only {n}"));
+            let missing = || refused(format!("material {index}: the scene has only {n}"));
             let material = description.materials[..n].get_mut(index).ok_or_else(missing)?;
             // The outline of a leaf and its relief stay.
             material.model = MaterialModel::Fixed(parsed(text)?);
@@ -247,8 +247,8 @@ struct ProbeReport {
 }
 
 /// Reads the page's settings.
-pub(crate) fn parse<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, JsError> {
-    serde_json::from_str(json).map_err(|e| JsError::new(&format!("settings: {e}")))
+pub(crate) fn parse<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, Error> {
+    Ok(serde_json::from_str(json)?)
 }
 
 /// Writes what the page reads.
@@ -256,14 +256,12 @@ pub(crate) fn to_json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
-#[wasm_bindgen]
 impl Engine {
     /// Loads and builds a scene: `{"scene", "material", "materials", "ground"}`; returns what it brings.
     ///
     /// # Errors
     /// If there is no such scene, its file is damaged, or the material is none.
-    #[wasm_bindgen(js_name = loadScene)]
-    pub fn load_scene(&mut self, json: &str) -> Result<String, JsError> {
+    pub fn load_scene(&mut self, json: &str) -> Result<String, Error> {
         let setup: Setup = parse(json)?;
         let (mut description, warnings) = if let Ok(scene) = BuiltinScene::from_str(&setup.scene) {
             (scene.description(), Vec::new())
@@ -274,7 +272,7 @@ impl Engine {
             let bytes = self
                 .files
                 .get(path)
-                .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
+                .map_err(|e| refused(format!("cannot read {}: {e}", path.display())))?;
             let resolver = |path: &Path| self.files.get(path).map(<[u8]>::to_vec);
             let loaded = load_bytes(path, bytes, &resolver, &options).map_err(error)?;
             (loaded.description, loaded.warnings)
@@ -317,9 +315,8 @@ impl Engine {
             up: up.vector().to_array(),
             environment: light,
         };
-        self.session = None;
-        self.scene = Some((Rc::new(scene), LoadedScene { up, camera, scale }));
-        self.setup = setup;
+        self.rendering = None;
+        self.scene = Some((Arc::new(scene), LoadedScene { up, camera, scale }));
         Ok(to_json(&report))
     }
 
@@ -327,8 +324,7 @@ impl Engine {
     ///
     /// # Errors
     /// If there is no such probe or its file is damaged.
-    #[wasm_bindgen(js_name = loadEnvironment)]
-    pub fn load_environment(&mut self, json: &str) -> Result<String, JsError> {
+    pub fn load_environment(&mut self, json: &str) -> Result<String, Error> {
         let light: Light = parse(json)?;
         let (image, warnings) = if let Ok(probe) = BuiltinProbe::from_str(&light.probe) {
             (probe.image(light.rows.clamp(1, 4096)), Vec::new())
@@ -337,7 +333,7 @@ impl Engine {
             let bytes = self
                 .files
                 .get(path)
-                .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
+                .map_err(|e| refused(format!("cannot read {}: {e}", path.display())))?;
             let options =
                 ProbeOptions { max_memory: Some(MAX_PROBE_MEMORY), ..ProbeOptions::default() };
             let name = &light.probe;
@@ -358,17 +354,19 @@ impl Engine {
         let environment = settings.environment(image).map_err(error)?;
         let map = environment.map();
         let report = ProbeReport { size: [map.width, map.height], warnings };
-        self.session = None;
+        self.rendering = None;
         self.extraction = None;
         self.prefiltered = None;
-        self.environment = Some(Rc::new(environment));
+        self.environment = Some(Arc::new(environment));
         Ok(to_json(&report))
     }
 
     /// The sizes, at most half the file's, at which its map can be read where it needs too much memory as a whole: JSON of
     /// `{"reduce", "size"}`, the largest first. None for other files.
-    #[wasm_bindgen(js_name = smallerMaps)]
-    pub fn smaller_maps(&self, probe: &str) -> String {
+    ///
+    /// # Errors
+    /// None.
+    pub fn smaller_maps(&self, probe: &str) -> Result<String, Error> {
         let bytes = self.files.get(Path::new(probe)).unwrap_or_default();
         let is_too_large = memory_to_read(bytes).is_ok_and(|needed| needed > MAX_PROBE_MEMORY);
         let sizes = [2, 4, 8].into_iter().filter_map(|reduce| {
@@ -376,23 +374,21 @@ impl Engine {
             let fits = is_too_large && needed <= MAX_PROBE_MEMORY;
             fits.then_some(SmallerMap { reduce, size: [width, height] })
         });
-        to_json(&sizes.collect::<Vec<_>>())
+        Ok(to_json(&sizes.collect::<Vec<_>>()))
     }
 
     /// Turns the environment \[degrees\]; the map is not read again.
     ///
     /// # Errors
     /// If there is no environment or the angle is not finite.
-    #[wasm_bindgen(js_name = turnEnvironment)]
-    pub fn turn_environment(&mut self, rotate: f32) -> Result<(), JsError> {
-        self.session = None;
+    pub fn turn_environment(&mut self, rotate: f32) -> Result<(), Error> {
+        self.rendering = None;
         self.extraction = None;
         self.prefiltered = None;
-        let missing = || JsError::new("there is no environment yet; load one first");
-        let environment = self.environment.take().ok_or_else(missing)?;
-        let environment = Rc::unwrap_or_clone(environment);
+        let environment = self.environment.take().ok_or(Error::NoEnvironment)?;
+        let environment = Arc::unwrap_or_clone(environment);
         let by = rotate - environment.orientation().rotation;
-        self.environment = Some(Rc::new(environment.rotated(by).map_err(error)?));
+        self.environment = Some(Arc::new(environment.rotated(by).map_err(error)?));
         Ok(())
     }
 }
