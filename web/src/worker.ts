@@ -75,9 +75,9 @@ function answer(message: ToWorker) {
       // Of several waiting renders, keep the last.
       if (pending.some((other) => other.kind === "render")) break;
       try {
-        const started = JSON.parse(engine!.start(message.settings));
+        const strategy = engine!.start(message.settings);
         rendering = { token: message.token, paused: false };
-        post({ kind: "started", token: message.token, strategy: started.strategy });
+        post({ kind: "started", token: message.token, strategy });
       } catch (error) {
         rendering = undefined;
         post({ kind: "failed", token: message.token, error: text(error), dead: isDead(error) });

@@ -58,16 +58,16 @@ impl Engine {
         f: impl FnOnce(&Inspector<'_>, &InspectState) -> Result<T, Error>,
     ) -> Result<T, Error> {
         let state: InspectState = parse(json)?;
-        let (scene, loaded) = self.scene()?;
+        let scene = self.scene()?;
         let environment = self.environment()?;
         let (width, height) = (state.width, state.height);
-        let view = loaded.camera(scene, state.camera, width as f32 / height.max(1) as f32);
+        let view = scene.camera(state.camera, width as f32 / height.max(1) as f32);
         let camera = Camera::new(&view, width, height).map_err(error)?;
         let settings =
             RenderSettings { width, height, seed: state.seed, ..RenderSettings::default() };
         let pixel = [state.x, state.y];
-        let inspector =
-            Inspector::new(scene, &camera, environment, &settings, pixel).map_err(refused)?;
+        let inspector = Inspector::new(&scene.scene, &camera, environment, &settings, pixel)
+            .map_err(refused)?;
         f(&inspector, &state)
     }
 

@@ -7,6 +7,7 @@ mod calls;
 mod direction;
 mod error;
 mod files;
+mod host;
 mod inspect;
 mod lights;
 mod lobe;
@@ -17,28 +18,30 @@ mod rows;
 mod session;
 mod setup;
 
+use std::path::Path;
 use std::sync::Arc;
 
 use domelight::environment::Environment;
 use domelight::render::Checkpoint;
 use domelight::rig::Extraction;
-use domelight::scene::Scene;
 
+pub use calls::{Answer, Argument};
 pub use error::Error;
 use files::Files;
+pub use host::{Host, Stamp};
 pub use map::MapView;
 use prefilter::Textures;
 use session::Rendering;
 pub use session::{Statistics, Update};
-use setup::LoadedScene;
+use setup::{Light, LoadedLight, LoadedScene};
 
 /// Scene, light and camera, and what is rendered of them.
 pub struct Engine {
-    /// Milliseconds since any moment.
-    now: fn() -> f64,
+    host: Host,
     files: Files,
-    scene: Option<(Arc<Scene>, LoadedScene)>,
-    environment: Option<Arc<Environment>>,
+    scene: Option<Arc<LoadedScene>>,
+    /// The light, and the settings that it was loaded with.
+    light: Option<(Light, Arc<LoadedLight>)>,
     rendering: Option<Rendering>,
     /// Parts of a picture that engines have rendered.
     parts: Vec<Checkpoint>,
@@ -49,13 +52,13 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// An engine without files, scene and light; `now` is a clock \[ms\].
-    pub fn new(now: fn() -> f64) -> Self {
+    /// An engine without files, scene and light.
+    pub fn new(host: Host) -> Self {
         Self {
-            now,
+            host,
             files: Files::default(),
             scene: None,
-            environment: None,
+            light: None,
             rendering: None,
             parts: Vec::new(),
             extraction: None,
@@ -81,11 +84,21 @@ impl Engine {
         Ok(())
     }
 
-    fn scene(&self) -> Result<&(Arc<Scene>, LoadedScene), Error> {
+    /// Whether a picture was begun of what is loaded.
+    pub fn is_rendering(&self) -> bool {
+        self.rendering.is_some()
+    }
+
+    /// Whether a file is of the disk: one that the page has given goes before.
+    fn is_on_disk(&self, path: &Path) -> bool {
+        !self.files.has(path) && self.host.may_open(path)
+    }
+
+    fn scene(&self) -> Result<&Arc<LoadedScene>, Error> {
         self.scene.as_ref().ok_or(Error::NoScene)
     }
 
     fn environment(&self) -> Result<&Arc<Environment>, Error> {
-        self.environment.as_ref().ok_or(Error::NoEnvironment)
+        self.light.as_ref().map(|(_, light)| &light.environment).ok_or(Error::NoEnvironment)
     }
 }

@@ -32,12 +32,12 @@ impl Engine {
         &self,
         material: &str,
         theta_o: f32,
-        n: u32,
+        n: usize,
         seed: u32,
     ) -> Result<Vec<f32>, Error> {
         let (bsdf, wo) = view(material, theta_o)?;
         let sampler = Sampler::new(SamplerKind::Independent, seed.into(), 0);
-        let numbers = (0..n).map(|i| sampler.numbers(Dimension::Brdf, i));
+        let numbers = (0..n as u32).map(|i| sampler.numbers(Dimension::Brdf, i));
         let drawn = numbers.filter_map(|u| bsdf.sample(wo, u.u_lobe(), u.u()));
         Ok(drawn.flat_map(|sample| sample.wi.to_array()).collect())
     }

@@ -9,7 +9,7 @@ use domelight::geometry::{Hit, Ray};
 use domelight::math::{Vec3, vec2};
 use domelight::render::visibility;
 use domelight::sampling::{Sampler, SamplerKind};
-use domelight::scene::{Camera, Scene};
+use domelight::scene::Camera;
 use domelight::strategy::{
     Estimator, PixelPoints, Portal, PreparedStrategy, ShadingPoint, Strategy, StrategySpec,
     TileShading,
@@ -17,7 +17,7 @@ use domelight::strategy::{
 use serde::{Deserialize, Serialize};
 
 use crate::error::{error, refused};
-use crate::setup::{CameraState, parse, to_json};
+use crate::setup::{CameraState, LoadedScene, parse, to_json};
 use crate::{Engine, Error};
 
 /// A pixel of a picture.
@@ -45,14 +45,14 @@ struct PointReport {
 
 /// The shading point in the middle of a pixel.
 struct Picked {
-    scene: Arc<Scene>,
+    scene: Arc<LoadedScene>,
     at: ShadingPoint,
 }
 
 impl Picked {
     /// V in [0, 1] toward each direction.
     fn visibility(&self, directions: &[Vec3]) -> Vec<f32> {
-        visibility(&self.scene, &self.at, directions)
+        visibility(&self.scene.scene, &self.at, directions)
     }
 }
 
@@ -216,17 +216,17 @@ impl Engine {
     /// What the middle of a pixel shows of the scene.
     fn sight(&self, json: &str) -> Result<Option<(Ray, Hit)>, Error> {
         let Pixel { x, y, width, height, camera } = parse(json)?;
-        let (scene, loaded) = self.scene()?;
-        let view = loaded.camera(scene, camera, width as f32 / height.max(1) as f32);
+        let scene = self.scene()?;
+        let view = scene.camera(camera, width as f32 / height.max(1) as f32);
         let camera = Camera::new(&view, width, height).map_err(error)?;
         let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
-        Ok(scene.camera_hit(&ray, 0, 0).map(|hit| (ray, hit)))
+        Ok(scene.scene.camera_hit(&ray, 0, 0).map(|hit| (ray, hit)))
     }
 
     fn pick(&self, json: &str) -> Result<Option<Picked>, Error> {
-        let (scene, sight) = (&self.scene()?.0, self.sight(json)?);
+        let (scene, sight) = (self.scene()?, self.sight(json)?);
         let picked =
-            |(ray, hit)| Picked { at: scene.shading_point(&ray, &hit), scene: scene.clone() };
+            |(ray, hit)| Picked { at: scene.scene.shading_point(&ray, &hit), scene: scene.clone() };
         Ok(sight.map(picked))
     }
 
@@ -432,7 +432,7 @@ impl Engine {
         let visible = |wi: &[Vec3]| picked.visibility(wi);
         for seed in 0..REPLICATES {
             let count = |wi, _, _| counts.add(wi);
-            let portals = picked.scene.portals();
+            let portals = picked.scene.scene.portals();
             shadow_rays(&picked.at, &strategy, portals, (SAMPLES, seed), visible, count);
         }
         let texels = Texels::new(mapping, width, environment.orientation().up);
@@ -446,7 +446,7 @@ impl Engine {
     /// # Errors
     /// If the scene is missing.
     pub fn material_at(&self, pixel: &str) -> Result<Option<u32>, Error> {
-        let scene = &self.scene()?.0;
+        let scene = &self.scene()?.scene;
         Ok(self.sight(pixel)?.map(|(_, hit)| scene.material_of(&hit) as u32))
     }
 
@@ -485,7 +485,7 @@ impl Engine {
         pixel: &str,
         strategy: &str,
         mapping: &str,
-        n: u32,
+        n: usize,
         seed: u32,
     ) -> Result<Vec<f32>, Error> {
         let mapping = mapping_of(mapping)?;
@@ -494,11 +494,18 @@ impl Engine {
         let from_world = self.environment()?.orientation().up.from_y_up().transpose();
         let visible = |wi: &[Vec3]| picked.visibility(wi);
         let mut out = Vec::new();
-        let portals = picked.scene.portals();
-        shadow_rays(&picked.at, &strategy, portals, (n, seed.into()), visible, |wi, weight, v| {
-            let uv = mapping.uv(from_world * wi);
-            out.extend([uv.x, uv.y, weight.luminance(), v]);
-        });
+        let portals = picked.scene.scene.portals();
+        shadow_rays(
+            &picked.at,
+            &strategy,
+            portals,
+            (n as u32, seed.into()),
+            visible,
+            |wi, weight, v| {
+                let uv = mapping.uv(from_world * wi);
+                out.extend([uv.x, uv.y, weight.luminance(), v]);
+            },
+        );
         Ok(out)
     }
 }

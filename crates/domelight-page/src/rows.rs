@@ -77,13 +77,13 @@ impl Engine {
     ///
     /// # Errors
     /// If there is no environment or it is black.
-    pub fn map_samples(&self, n: u32, seed: u32) -> Result<String, Error> {
+    pub fn map_samples(&self, n: usize, seed: u32) -> Result<String, Error> {
         let environment = self.environment()?;
         let [width, height] = [environment.map().width, environment.map().height];
         let mut weights = weights(environment);
         let table = table(width, &weights).map_err(refused)?;
         let sampler = Sampler::new(SamplerKind::Independent, seed.into(), 0);
-        let drawn: Vec<_> = (0..n)
+        let drawn: Vec<_> = (0..n as u32)
             .map(|i| {
                 let u = sampler.numbers(Dimension::Environment, i);
                 table.sample(vec2(u.0[0], u.0[1]))

@@ -9,21 +9,24 @@ use domelight::render::{
     automatic_exposure,
 };
 use domelight::sampling::SamplerKind;
-use domelight::scene::{Camera, Scene};
+use domelight::scene::Camera;
 use domelight::strategy::StrategySpec;
 use self_cell::self_cell;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{error, refused};
-use crate::setup::{CameraState, parse, to_json};
+use crate::setup::{CameraState, LoadedScene, parse};
 use crate::{Engine, Error};
 
 /// An estimate of the variance is followed by so many times its own time without one.
 const VARIANCE_PAUSE: f64 = 30.0;
 
+/// Pixels along an edge of a picture at the most, far above what the page offers.
+const MAX_SIZE: usize = 1 << 13;
+
 /// What a renderer borrows.
 pub(crate) struct Borrowed {
-    scene: Arc<Scene>,
+    scene: Arc<LoadedScene>,
     environment: Arc<Environment>,
     camera: Camera,
 }
@@ -53,14 +56,6 @@ struct RenderState {
     camera: Option<CameraState>,
     /// Shard k of n.
     shard: [usize; 2],
-}
-
-/// How a render is divided and what it does, for the page.
-#[derive(Serialize)]
-struct Started {
-    strategy: String,
-    description: String,
-    pixels: usize,
 }
 
 /// What was done so far, for the page.
@@ -231,12 +226,16 @@ impl Engine {
     /// What a picture of these settings shows.
     fn borrowed(&self, state: &RenderState) -> Result<Borrowed, Error> {
         let [k, n] = state.shard;
-        if state.width == 0 || state.height == 0 || state.spp == 0 || k >= n {
-            return Err(refused("settings: a picture has pixels, samples and shards"));
+        let is_size = |n: usize| (1..=MAX_SIZE).contains(&n);
+        if !is_size(state.width) || !is_size(state.height) || state.spp == 0 || k >= n {
+            let text = format!(
+                "settings: a picture has up to {MAX_SIZE} pixels along an edge, samples and shards"
+            );
+            return Err(refused(text));
         }
-        let (scene, loaded) = self.scene()?;
+        let scene = self.scene()?;
         let aspect = state.width as f32 / state.height as f32;
-        let view = loaded.camera(scene, state.camera, aspect);
+        let view = scene.camera(state.camera, aspect);
         let camera = Camera::new(&view, state.width, state.height).map_err(error)?;
         Ok(Borrowed { scene: scene.clone(), environment: self.environment()?.clone(), camera })
     }
@@ -248,11 +247,11 @@ impl Engine {
     pub fn automatic_exposure(&self, json: &str) -> Result<f32, Error> {
         let state: RenderState = parse(json)?;
         let Borrowed { scene, environment, camera } = self.borrowed(&state)?;
-        Ok(automatic_exposure(&scene, &camera, &environment, &state.settings()).stops)
+        Ok(automatic_exposure(&scene.scene, &camera, &environment, &state.settings()).stops)
     }
 
     /// Begins a picture, or a shard of it: `{"width", "height", "spp", "strategy", "seed", "hideEnvironment", "camera",
-    /// "shard"}`.
+    /// "shard"}`. Returns the strategy with the pilot's choices.
     ///
     /// # Errors
     /// If scene or environment are missing, the camera makes no picture, or the strategy does not suit the environment.
@@ -264,21 +263,13 @@ impl Engine {
         let session = Session::try_new(borrowed, |borrowed| {
             let Borrowed { scene, environment, camera } = borrowed;
             let renderer =
-                Renderer::new(scene, camera, environment, state.strategy, state.settings());
+                Renderer::new(&scene.scene, camera, environment, state.strategy, state.settings());
             renderer.map(|renderer| renderer.shard(k, n)).map_err(error)
         })?;
         let rendering = Rendering::new(session);
-        let started = rendering.with(|renderer| {
-            let spec = renderer.spec().unwrap_or(state.strategy);
-            let area = |t| renderer.tiling().tile(t).area();
-            Started {
-                strategy: spec.to_string(),
-                description: spec.description(),
-                pixels: renderer.tiles().map(area).sum(),
-            }
-        });
+        let spec = rendering.with(|renderer| renderer.spec()).unwrap_or(state.strategy);
         self.rendering = Some(rendering);
-        Ok(to_json(&started))
+        Ok(spec.to_string())
     }
 
     /// Ends the render as near as its tiles allow to a number of shadow rays; [`Update::spent`] says when.
@@ -293,7 +284,7 @@ impl Engine {
     /// # Errors
     /// If nothing was started.
     pub fn step(&mut self, milliseconds: f64) -> Result<Update, Error> {
-        let now = self.now;
+        let now = self.host.now;
         let rendering = self.rendering.as_mut().ok_or(Error::NothingStarted)?;
         Ok(rendering.step(milliseconds, now))
     }

@@ -1,8 +1,12 @@
 //! The engine in a browser: an [`Engine`] a Worker, driven by the page in `web/`. It is that of `domelight-page`, bound to
 //! JavaScript.
 
-use domelight_page::{MapView, for_each_call};
+use domelight_page::{Host, MapView, for_each_call};
 use wasm_bindgen::prelude::*;
+
+/// The most that reading a scene or a map takes: an instance of WebAssembly has 4 GiB at the most, and builds a hierarchy
+/// beside them \[bytes\].
+const MAX_MEMORY: u64 = 1 << 30;
 
 /// Scene, light and camera of one Worker, and what it renders.
 #[wasm_bindgen]
@@ -78,10 +82,10 @@ impl Engine {
     #[wasm_bindgen(constructor)]
     pub fn new() -> Self {
         std::panic::set_hook(Box::new(|info| panicked(&info.to_string())));
-        Self(domelight_page::Engine::new(now))
+        Self(domelight_page::Engine::new(Host::new(now, Some(MAX_MEMORY), Vec::new())))
     }
 
-    /// Begins a picture, or a shard of it.
+    /// Begins a picture, or a shard of it; returns the strategy with the pilot's choices.
     ///
     /// # Errors
     /// If there is nothing to render, or the settings are wrong.
