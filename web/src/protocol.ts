@@ -1,4 +1,4 @@
-// The messages between the page and its Workers.
+// The messages between the page and its engines: Workers, or a program.
 
 import type { Engine, MapView } from "../dist/engine/engine.js";
 
@@ -63,4 +63,17 @@ export type FromWorker =
   | { kind: "started"; token: number; strategy: string }
   | { kind: "spent"; token: number }
   | { kind: "failed"; token: number; error: string; dead: boolean }
+  /** Files that the program opened have changed. */
+  | { kind: "changed" }
+  /** The connection to the program has ended. */
+  | { kind: "lost" }
   | Update;
+
+/** The way to an engine. */
+export interface Link {
+  /** Called for each of its messages. */
+  receive(message: FromWorker): void;
+  post(message: ToWorker, transfer: Transferable[]): void;
+  /** Ends the engine. */
+  end(): void;
+}
