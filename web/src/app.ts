@@ -3,6 +3,7 @@
 import { $, h, latest } from "./dom";
 import type { Camera, Engines, Host } from "./engines";
 import { History } from "./history";
+import * as native from "./native";
 import { DEFAULT, SCENES, fileName, fromHash, isBuiltinProbe, toHash, type State } from "./state";
 
 export interface SceneReport {
@@ -41,6 +42,9 @@ const MAX_FILES = 1 << 30;
  *  guess, replaced by measurements. */
 const ENGINE_MEMORY = 40 * 2 ** 20, DECODED = 8;
 
+const isScene = (path: string) => /\.(glb|gltf|obj|ply|stl|off|toml)$/i.test(path);
+const isProbe = (path: string) => /\.(hdr|exr|pfm|pic|rgbe)$/i.test(path);
+
 /** The engine's settings of a light. */
 const withTurn = (env: string, rotate: number) => JSON.stringify({ ...JSON.parse(env), rotate });
 
@@ -48,8 +52,8 @@ export class App {
   state: State;
   scene: SceneReport | null = null;
   probe: ProbeReport | null = null;
-  /** Names of the dropped scene and probe files. */
-  files = { scenes: [] as string[], probes: [] as string[] };
+  /** Names of the scene and probe files that were dropped, or that the program opens. */
+  files = { scenes: native.files?.filter(isScene) ?? [], probes: native.files?.filter((path) => !isScene(path)) ?? [] };
   /** The files dropped with the scene and with the probe. */
   private drops = { scene: [] as Contents, probe: [] as Contents };
   /** The last configuration that loaded without errors. */
@@ -76,6 +80,9 @@ export class App {
       this.loaded = { scene: "", env: "", rotate: NaN };
       void this.provide().then(() => this.load());
     };
+    engines.onChanged = () => this.reload();
+    engines.onLost = (why) => this.tell(why, true);
+    this.adoptFromProgram();
     addEventListener("hashchange", () => {
       this.address = location.hash;
       if (location.hash.replace(/^#/, "") === toHash(this.state)) return;
@@ -85,6 +92,23 @@ export class App {
       this.emit("all");
       this.load();
     });
+  }
+
+  /** Without a light in the address, a file that the program opens brings its own, or stands under the sky as it is. */
+  private adoptFromProgram() {
+    const given = new URLSearchParams(location.hash.replace(/^#/, ""));
+    if (!native.files?.includes(this.state.scene) || ["env", "rotate", "scale", "ev"].some((key) => given.has(key))) return;
+    this.state.rotate = 0;
+    this.adopts = true;
+  }
+
+  /** Loads the files that the program opens again. The camera and the exposure stay. */
+  private reload() {
+    this.revision++;
+    this.loaded = { scene: "", env: "", rotate: NaN };
+    this.held.host = null;
+    this.forgetError();
+    this.load();
   }
 
   /** The part of the address that the state was read from or written to. */
@@ -194,8 +218,13 @@ export class App {
   /** The files named by the state that have not been dropped yet. */
   get missing(): { scene: string; env: string } {
     const { scene, env } = this.state;
-    const has = (name: string) => this.contents().some(({ path }) => fileName(path) === fileName(name));
+    const has = (name: string) => this.contents().some(({ path }) => fileName(path) === fileName(name)) || this.isOpened(name);
     return { scene: SCENES.includes(scene) || has(scene) ? "" : scene, env: isBuiltinProbe(env) || has(env) ? "" : env };
+  }
+
+  /** Whether the program opens a file: one that was named to it, or the light that such a scene names. */
+  private isOpened(name: string): boolean {
+    return !!native.files && (native.files.includes(name) || name === this.scene?.environment?.probe);
   }
 
   /** The state's camera; null while its scene is missing. */
@@ -443,12 +472,10 @@ export class App {
   async open(files: { path: string; file: File }[]) {
     const total = files.reduce((sum, { file }) => sum + file.size, 0);
     if (total > MAX_FILES) {
-      this.tell(`${(total / 2 ** 30).toFixed(1)} GiB exceed this page’s limit of 1 GiB; use the program`, true);
+      this.tell(`${(total / 2 ** 30).toFixed(1)} GiB exceed this page’s limit of 1 GiB; ${native.files ? "name the files to domelight view" : "use the program"}`, true);
       return;
     }
     this.tell("Reading …");
-    const isScene = (path: string) => /\.(glb|gltf|obj|ply|stl|off|toml)$/i.test(path);
-    const isProbe = (path: string) => /\.(hdr|exr|pfm|pic|rgbe)$/i.test(path);
     const paths = files.map(({ path }) => path);
     // Scene files come before the meshes that they name.
     const scenes = paths.filter(isScene).sort((a, b) => Number(/\.toml$/i.test(b)) - Number(/\.toml$/i.test(a))), radiance = paths.filter(isProbe);

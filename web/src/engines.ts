@@ -1,8 +1,10 @@
-// The Workers, one engine each.
+// The engines: one in each Worker, or those of a program.
 
 import { whileBusy } from "./busy";
+import * as native from "./native";
 import { Passes } from "./passes";
-import type { Arguments, Call, FromWorker, Result, Statistics, ToWorker, Update } from "./protocol";
+import type { Arguments, Call, FromWorker, Link, Result, Statistics, ToWorker, Update } from "./protocol";
+import { socketLink } from "./socket";
 
 /** The first Worker, and the engine's module that it unpacks from the page. */
 async function unpacked(script: string): Promise<[Worker, WebAssembly.Module]> {
@@ -18,6 +20,18 @@ async function unpacked(script: string): Promise<[Worker, WebAssembly.Module]> {
   return [worker, module];
 }
 
+/** An engine in its own Worker. */
+function workerLink(worker: Worker, module: WebAssembly.Module): Link {
+  const link: Link = {
+    receive() {},
+    post: (message, transfer) => worker.postMessage(message, transfer),
+    end: () => worker.terminate(),
+  };
+  worker.onmessage = ({ data }: MessageEvent<FromWorker>) => link.receive(data);
+  link.post({ kind: "boot", module }, []);
+  return link;
+}
+
 /** Half of the computer's memory as reported by the browser, or 4 GiB if it is not reported; `?memory=` in the address
  *  sets another limit [GiB]. */
 function memoryLimit(): number {
@@ -26,26 +40,32 @@ function memoryLimit(): number {
   return 2 ** 30 * (given > 0 ? given : 0.5 * deviceMemory);
 }
 
-/** An engine in its own Worker. */
+const LOST = "the connection to domelight view has ended: reload this page, or start it again";
+
+/** An engine. */
 export class Host {
-  private worker!: Worker;
+  private link!: Link;
   private nextId = 0;
   private waiting = new Map<number, { resolve: (value: never) => void; reject: (error: Error) => void }>();
   onRender: (message: Extract<FromWorker, { token: number }>) => void = () => {};
   /** Called after a new engine, without scene and light, has replaced one that died. */
   onRestart: () => void = () => {};
+  /** Called when files that the program opened have changed. */
+  onChanged: () => void = () => {};
+  /** Called when the connection to the program has ended. */
+  onLost: (why: string) => void = () => {};
+  private isLost = false;
 
   /** The engine's memory use [bytes]. */
   memory = 0;
 
-  constructor(private module: WebAssembly.Module, private script: string, worker?: Worker) {
-    this.boot(worker);
+  constructor(private connect: () => Link) {
+    this.boot();
   }
 
-  private boot(worker = new Worker(this.script)) {
-    this.worker = worker;
-    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
-    this.send({ kind: "boot", module: this.module });
+  private boot() {
+    this.link = this.connect();
+    this.link.receive = (message) => this.receive(message);
   }
 
   private receive(message: FromWorker) {
@@ -63,6 +83,14 @@ export class Host {
         this.waiting.delete(message.id);
         if (message.dead) this.restart(message.error);
         return;
+      case "changed":
+        this.onChanged();
+        return;
+      case "lost":
+        this.isLost = true;
+        this.end(LOST);
+        this.onLost(LOST);
+        return;
       default:
         this.onRender(message);
         if (message.kind === "failed" && message.dead) this.restart(message.error);
@@ -77,7 +105,7 @@ export class Host {
 
   /** Ends the engine and frees its memory. */
   end(why: string) {
-    this.worker.terminate();
+    this.link.end();
     this.waiting.forEach(({ reject }) => reject(new Error(why)));
     this.waiting.clear();
     this.memory = 0;
@@ -90,10 +118,11 @@ export class Host {
   }
 
   send(message: ToWorker, transfer: Transferable[] = []) {
-    this.worker.postMessage(message, transfer);
+    if (!this.isLost) this.link.post(message, transfer);
   }
 
   call<C extends Call>(call: C, ...args: Arguments<C>): Promise<Result<C>> {
+    if (this.isLost) return Promise.reject(new Error(LOST));
     const id = this.nextId++;
     return whileBusy(new Promise((resolve, reject) => {
       this.waiting.set(id, { resolve, reject });
@@ -212,27 +241,37 @@ export class Engines {
   private jobs: Job[] = [];
   events: JobEvents = { update() {}, ended() {}, failed() {} };
   onRestart: () => void = () => {};
+  onChanged: () => void = () => {};
+  onLost: (why: string) => void = () => {};
 
   /** The number of engines that hold the scene; the others stay empty if memory is short. */
   active: number;
   /** The memory limit of all engines together [bytes]. */
-  readonly memory = memoryLimit();
+  readonly memory = native.files ? Infinity : memoryLimit();
 
-  private constructor(readonly hosts: Host[], private another: () => Host) {
+  /** `areSingle` engines have one thread each, so that several share a picture. */
+  private constructor(readonly hosts: Host[], private another: () => Host, private areSingle: boolean) {
     this.active = hosts.length;
     for (const host of hosts) {
       host.onRender = (message) => this.receive(host, message);
       host.onRestart = () => this.onRestart();
+      host.onLost = (why) => this.onLost(why);
     }
+    hosts[0].onChanged = () => this.onChanged();
   }
 
   static async create(): Promise<Engines> {
+    // At least two, for two strategies side by side.
+    if (native.files) {
+      const another = () => new Host(() => socketLink(native.socket()));
+      return new Engines([another(), another()], another, false);
+    }
     const script = URL.createObjectURL(new Blob([document.getElementById("worker")!.textContent!], { type: "text/javascript" }));
     const [worker, module] = await unpacked(script);
-    // At least two, for two strategies side by side.
     const n = Math.max(2, Math.min(navigator.hardwareConcurrency || 2, 8));
-    const another = () => new Host(module, script);
-    return new Engines([new Host(module, script, worker), ...Array.from({ length: n - 1 }, another)], another);
+    const free = [worker];
+    const another = () => new Host(() => workerLink(free.pop() ?? new Worker(script), module));
+    return new Engines(Array.from({ length: n }, another), another, true);
   }
 
   /** The engine that answers calls. */
@@ -271,7 +310,8 @@ export class Engines {
   /** Renders pictures side by side, each on its share of the engines. */
   render(pictures: RenderSettings[]): Job[] {
     this.jobs = pictures.map((settings, i) => {
-      const hosts = this.hosts.slice(0, this.active).filter((_, k) => k % pictures.length === i);
+      const all = this.areSingle ? this.working : this.working.slice(0, pictures.length);
+      const hosts = all.filter((_, k) => k % pictures.length === i);
       const job = new Job(this.nextToken++, hosts, settings);
       hosts.forEach((host, k) =>
         host.send({ kind: "render", token: job.token, settings: JSON.stringify({ ...settings, shard: [k, hosts.length] }) }));

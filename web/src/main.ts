@@ -9,6 +9,7 @@ import { explain, showMeanings } from "./glossary";
 import { Lecture } from "./lecture";
 import { LightsPanel } from "./lights";
 import { MapPanel } from "./map";
+import * as native from "./native";
 import { PicturePanel } from "./picture";
 import { speakValues } from "./spoken";
 import { PANELS } from "./state";
@@ -16,6 +17,7 @@ import { XrayPanel } from "./xray";
 
 /** The name of a browser feature that the page needs but lacks, or null. */
 function missing(): string | null {
+  if (native.files) return null;
   if (typeof WebAssembly === "undefined") return "WebAssembly";
   // A function with one SIMD instruction.
   const simd = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];

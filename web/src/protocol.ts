@@ -1,13 +1,10 @@
-// The messages between the page and its Workers.
+// The messages between the page and its engines: Workers, or a program.
 
-import type { Engine, MapView, lobeSamples, lobeSection } from "../dist/engine/engine.js";
+import type { Engine, MapView } from "../dist/engine/engine.js";
 
 type Methods = { [K in keyof Engine]: Engine[K] extends (...args: never[]) => unknown ? K : never }[keyof Engine];
-export type Call = Exclude<Methods, "free" | typeof Symbol.dispose> | "lobeSection" | "lobeSamples";
-type Signature<C extends Call> = C extends "lobeSection" ? typeof lobeSection
-  : C extends "lobeSamples" ? typeof lobeSamples
-  : C extends keyof Engine ? Engine[C] : never;
-export type Arguments<C extends Call> = Signature<C> extends (...args: infer A) => unknown ? A : never;
+export type Call = Exclude<Methods, "free" | "start" | "setBudget" | "step" | typeof Symbol.dispose>;
+export type Arguments<C extends Call> = Engine[C] extends (...args: infer A) => unknown ? A : never;
 /** A map in a given mapping: R, G, B and alpha, or layer by layer. */
 export interface MapPicture {
   width: number;
@@ -18,7 +15,7 @@ export interface MapPicture {
 }
 
 type Plain<R> = R extends MapView ? MapPicture : R;
-export type Result<C extends Call> = Signature<C> extends (...args: never[]) => infer R ? Plain<R> : never;
+export type Result<C extends Call> = Engine[C] extends (...args: never[]) => infer R ? Plain<R> : never;
 
 /** The progress of one Worker, or of several combined. */
 export interface Statistics {
@@ -66,4 +63,17 @@ export type FromWorker =
   | { kind: "started"; token: number; strategy: string }
   | { kind: "spent"; token: number }
   | { kind: "failed"; token: number; error: string; dead: boolean }
+  /** Files that the program opened have changed. */
+  | { kind: "changed" }
+  /** The connection to the program has ended. */
+  | { kind: "lost" }
   | Update;
+
+/** The way to an engine. */
+export interface Link {
+  /** Called for each of its messages. */
+  receive(message: FromWorker): void;
+  post(message: ToWorker, transfer: Transferable[]): void;
+  /** Ends the engine. */
+  end(): void;
+}

@@ -1,6 +1,6 @@
 // One engine: answers calls in order, and renders between them in time slices.
 
-import { Engine, MapView, initSync, lobeSamples, lobeSection } from "../dist/engine/engine.js";
+import { Engine, MapView, initSync } from "../dist/engine/engine.js";
 import type { Call, FromWorker, ToWorker } from "./protocol";
 
 const SLICE = 16;
@@ -8,18 +8,11 @@ const SLICE = 16;
 let engine: Engine | undefined;
 let memory: WebAssembly.Memory | undefined;
 let rendering: Rendering | undefined;
-/** A render in progress, and where it is to end. */
+/** A render in progress. */
 interface Rendering {
   token: number;
   paused: boolean;
-  rays: number;
-  /** Shadow rays per millisecond, and those of the last single tile; 0 if unknown. */
-  rate: number;
-  ofTile: number;
-  budget: number;
 }
-/** The earliest time of the next variance estimate; estimates take at most a thirtieth of the time. */
-let nextVariance = 0;
 const pending: ToWorker[] = [];
 
 const post = (message: FromWorker, transfer: Transferable[] = []) =>
@@ -82,10 +75,9 @@ function answer(message: ToWorker) {
       // Of several waiting renders, keep the last.
       if (pending.some((other) => other.kind === "render")) break;
       try {
-        const started = JSON.parse(engine!.start(message.settings));
-        rendering = { token: message.token, paused: false, rays: 0, rate: 0, ofTile: 0, budget: Infinity };
-        nextVariance = 0;
-        post({ kind: "started", token: message.token, strategy: started.strategy });
+        const strategy = engine!.start(message.settings);
+        rendering = { token: message.token, paused: false };
+        post({ kind: "started", token: message.token, strategy });
       } catch (error) {
         rendering = undefined;
         post({ kind: "failed", token: message.token, error: text(error), dead: isDead(error) });
@@ -93,8 +85,10 @@ function answer(message: ToWorker) {
       soon();
       break;
     case "budget":
-      if (rendering?.token === message.token) Object.assign(rendering, { budget: message.rays, paused: false });
-      else post({ kind: "spent", token: message.token });
+      if (rendering?.token === message.token) {
+        engine!.setBudget(message.rays);
+        rendering.paused = false;
+      } else post({ kind: "spent", token: message.token });
       break;
     case "stop":
       rendering = undefined;
@@ -104,8 +98,6 @@ function answer(message: ToWorker) {
 }
 
 function call(name: Call, args: unknown[]): unknown {
-  if (name === "lobeSection") return lobeSection(...(args as Parameters<typeof lobeSection>));
-  if (name === "lobeSamples") return lobeSamples(...(args as Parameters<typeof lobeSamples>));
   const method = engine![name] as (...args: unknown[]) => unknown;
   const result = method.apply(engine, args);
   // The render in progress is of an old scene or light. After an error it continues.
@@ -121,30 +113,16 @@ function plain(view: MapView) {
 }
 
 function slice() {
-  const now = rendering!, { token } = now, left = now.budget - now.rays;
-  // Stop at the tile whose end is nearest to the budget.
-  if (left <= 0.5 * now.ofTile) {
-    now.paused = true;
-    now.budget = Infinity;
-    post({ kind: "spent", token });
-    return;
-  }
-  // Near the end, render single tiles.
-  const isNear = left < 2 * SLICE * now.rate;
+  const { token } = rendering!;
   try {
-    const begin = performance.now(), update = engine!.step(isNear ? 0 : SLICE), milliseconds = performance.now() - begin;
-    const windows = update.windows(), pixels = update.pixels();
-    const { complete, progress, whole } = update;
+    const update = engine!.step(SLICE), windows = update.windows(), pixels = update.pixels();
+    const { complete, progress, whole, milliseconds, spent } = update, statistics = JSON.parse(update.statistics());
     update.free();
-    const before = performance.now(), withVariance = complete || before >= nextVariance;
-    const statistics = JSON.parse(engine!.statistics(withVariance));
-    if (withVariance) nextVariance = performance.now() + 30 * (performance.now() - before);
-    const rays = statistics.shadowRays - now.rays;
-    Object.assign(now, { rays: statistics.shadowRays, rate: rays / Math.max(milliseconds, 0.1), ofTile: isNear ? rays : 0 });
     if (complete) rendering = undefined;
-    post({ kind: "update", token, windows, pixels, complete, progress, whole, milliseconds, statistics }, [windows.buffer as ArrayBuffer, pixels.buffer as ArrayBuffer]);
-    if (!complete) soon();
-    else if (now.budget < Infinity) post({ kind: "spent", token });
+    else if (spent) rendering!.paused = true;
+    if (complete || !spent) post({ kind: "update", token, windows, pixels, complete, progress, whole, milliseconds, statistics }, [windows.buffer as ArrayBuffer, pixels.buffer as ArrayBuffer]);
+    if (spent) post({ kind: "spent", token });
+    if (!complete && !spent) soon();
   } catch (error) {
     rendering = undefined;
     post({ kind: "failed", token, error: text(error), dead: isDead(error) });

@@ -21,11 +21,10 @@ const render = () => {
     const update = engine.step(16);
     update.windows();
     update.pixels();
+    update.statistics();
     ({ complete } = update);
     update.free();
-    engine.statistics(false);
   }
-  engine.statistics(true);
   return seconds() - start;
 };
 render();

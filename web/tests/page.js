@@ -12,7 +12,7 @@ const first = (places) => places.filter(Boolean).find((place) => existsSync(plac
 /** The program whose pictures the page's must be. */
 export const program = first([process.env.DOMELIGHT, join(root, "target/release/domelight"), join(root, "target/debug/domelight")]);
 const browserPath = first([process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"]);
-const file = join(root, "web/dist/domelight.html");
+export const file = join(root, "web/dist/domelight.html");
 assert.ok(browserPath, "no Chromium: install it, or set CHROMIUM");
 assert.ok(existsSync(file), "no web/dist/domelight.html: run web/build first");
 export const address = pathToFileURL(file).href;
@@ -32,8 +32,8 @@ export const close = () => browser?.close();
 /** How much slower the page's main thread is made, to test what happens on a slow machine. */
 const throttling = Number(process.env.THROTTLE ?? 1);
 
-/** Opens the page; whatever goes wrong there, or reaches for the network, fails the test. */
-export async function open(hash = SMALL, { query = "", script, ready = "html[data-ready]", ...options } = {}) {
+/** Opens the page, from its file or from an address; whatever goes wrong there, or reaches for another place, fails the test. */
+export async function open(hash = SMALL, { query = "", at = `${address}${query}#${hash}`, script, ready = "html[data-ready]", ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, acceptDownloads: true, ...options });
   const page = await context.newPage();
   if (script) await page.addInitScript(script);
@@ -45,8 +45,9 @@ export async function open(hash = SMALL, { query = "", script, ready = "html[dat
     if (["error", "warning"].includes(message.type()) && !/GL Driver Message/.test(message.text())) complaints.push(message.text());
   });
   page.on("pageerror", (error) => complaints.push(String(error)));
-  page.on("request", (request) => /^(file|data|blob):/.test(request.url()) || complaints.push(request.url()));
-  await page.goto(`${address}${query}#${hash}`);
+  const isOwn = (url) => /^(file|data|blob):/.test(url) || (at.startsWith("http:") && url === at.replace(/#.*/, ""));
+  page.on("request", (request) => isOwn(request.url()) || complaints.push(request.url()));
+  await page.goto(at);
   await page.waitForSelector(ready);
   return { page, done: async () => { await context.close(); assert.deepEqual(complaints, []); } };
 }

@@ -14,3 +14,8 @@ pub(crate) fn start() -> Instant {
 pub(crate) fn elapsed() -> Duration {
     start().elapsed()
 }
+
+/// The same as a number \[ms\].
+pub(crate) fn milliseconds() -> f64 {
+    1000.0 * elapsed().as_secs_f64()
+}

@@ -44,6 +44,7 @@ mod tables;
 mod terminal;
 mod tone;
 mod turntable;
+mod view;
 
 use args::{Arguments, Command};
 use std::process::ExitCode;
@@ -67,6 +68,7 @@ fn main() -> ExitCode {
         Command::Ibl(arguments) => ibl::run(&arguments, quiet),
         Command::Tables(arguments) => tables::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
+        Command::View(arguments) => view::run(&arguments, quiet),
         Command::Page(arguments) => page::run(&arguments, quiet),
         Command::Conventions(arguments) => conventions::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),

@@ -21,14 +21,11 @@ const BASE: &str = "<meta name=\"base\" content=\"";
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &PageArguments, quiet: bool) -> Result<()> {
-    let source = match &arguments.from {
-        Some(file) => file.clone(),
-        None => installed()?,
-    };
+    let source = source(arguments.from.as_deref(), "--from")?;
     files::reads(&source)?;
     files::writes(&arguments.output)?;
     let name = source.display().to_string();
-    let page = read(&source).map_err(|error| UsageError(format!("{name}: {error}")))?;
+    let page = read(&source)?;
     let page = with_base(&page, arguments.base.as_deref())
         .ok_or_else(|| UsageError(format!("{name}: this is not the page of domelight")))?;
     files::write(&arguments.output, |out| out.write_all(page.as_bytes()))?;
@@ -42,10 +39,19 @@ pub(crate) fn run(arguments: &PageArguments, quiet: bool) -> Result<()> {
     Ok(())
 }
 
-fn read(source: &Path) -> io::Result<String> {
-    let mut page = String::new();
-    fs::File::open(source)?.take(MAX_BYTES).read_to_string(&mut page)?;
-    Ok(page)
+/// The page's file: the one that an option names, or else the one that came with the program.
+pub(crate) fn source(named: Option<&Path>, option: &str) -> Result<PathBuf> {
+    named.map_or_else(|| installed(option), |file| Ok(file.to_owned()))
+}
+
+/// Reads the page.
+pub(crate) fn read(source: &Path) -> Result<String, UsageError> {
+    let read = || {
+        let mut page = String::new();
+        fs::File::open(source)?.take(MAX_BYTES).read_to_string(&mut page)?;
+        Ok(page)
+    };
+    read().map_err(|error: io::Error| UsageError(format!("{}: {error}", source.display())))
 }
 
 /// Where the page may be: beside the program, in the folder of data that belongs to the program's, or, in a checkout, where
@@ -59,14 +65,14 @@ fn places(program: &Path) -> Vec<PathBuf> {
     folders.into_iter().flatten().map(|folder| folder.join(FILE)).collect()
 }
 
-fn installed() -> Result<PathBuf> {
+fn installed(option: &str) -> Result<PathBuf> {
     let program = env::current_exe().and_then(fs::canonicalize)?;
     let places = places(&program);
     let missing = || {
         let looked: Vec<_> = places.iter().take(2).map(|p| p.display().to_string()).collect();
         UsageError(format!(
             "the page is at neither {}: take {FILE} from an archive of the release, or make it with web/build in a checkout, \
-             and name it with --from",
+             and name it with {option}",
             looked.join(" nor ")
         ))
     };

@@ -22,6 +22,7 @@ mod rig_formats;
 mod tables;
 mod terminal;
 mod tone;
+mod view;
 
 #[test]
 fn every_file_of_this_folder_is_a_module() {

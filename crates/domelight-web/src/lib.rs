@@ -1,54 +1,80 @@
-//! The engine in a browser: an [`Engine`] a Worker, driven by the page in `web/`.
-//!
-//! Settings come as JSON, results as JSON or as arrays of numbers; nothing is read but what the page gives. Errors are
-//! the library's own sentences.
+//! The engine in a browser: an [`Engine`] a Worker, driven by the page in `web/`. It is that of `domelight-page`, bound to
+//! JavaScript.
 
-mod direction;
-mod files;
-mod inspect;
-mod lights;
-mod lobe;
-mod map;
-mod picture;
-mod prefilter;
-mod rows;
-mod session;
-mod setup;
-
-use std::rc::Rc;
-
-use domelight::environment::Environment;
-use domelight::render::Checkpoint;
-use domelight::rig::Extraction;
-use domelight::scene::Scene;
+use domelight_page::{Host, MapView, for_each_call};
 use wasm_bindgen::prelude::*;
 
-use files::Files;
-use prefilter::Textures;
-use session::Session;
-use setup::{LoadedScene, Setup};
-
-/// An error for the page: the library's sentence, with its causes.
-fn error(error: impl Into<domelight::Error>) -> JsError {
-    JsError::new(&error.into().to_string())
-}
+/// The most that reading a scene or a map takes: an instance of WebAssembly has 4 GiB at the most, and builds a hierarchy
+/// beside them \[bytes\].
+const MAX_MEMORY: u64 = 1 << 30;
 
 /// Scene, light and camera of one Worker, and what it renders.
 #[wasm_bindgen]
-#[derive(Default)]
-pub struct Engine {
-    files: Files,
-    scene: Option<(Rc<Scene>, LoadedScene)>,
-    environment: Option<Rc<Environment>>,
-    session: Option<Session>,
-    setup: Setup,
-    /// Parts of a picture that the Workers have rendered.
-    parts: Vec<Checkpoint>,
-    /// The last rig, and its settings.
-    extraction: Option<(String, Extraction)>,
-    /// The last prefiltered light, its settings and what there is to say of it.
-    prefiltered: Option<(String, String, Textures)>,
+pub struct Engine(domelight_page::Engine);
+
+/// A picture on the sphere of directions.
+#[wasm_bindgen(js_name = MapView)]
+pub struct MapPicture(MapView);
+
+/// What a step has done.
+#[wasm_bindgen]
+pub struct Update(domelight_page::Update);
+
+/// How JavaScript gets a result.
+pub trait ToJs {
+    /// What it gets.
+    type Js;
+    /// Converts it.
+    fn to_js(self) -> Self::Js;
 }
+
+/// Results that wasm-bindgen passes as they are.
+macro_rules! pass {
+    ($($type:ty),*) => {
+        $(impl ToJs for $type {
+            type Js = Self;
+            fn to_js(self) -> Self {
+                self
+            }
+        })*
+    };
+}
+
+pass!((), f32, Option<u32>, String, Vec<u8>, Vec<u32>, Vec<f32>);
+
+impl ToJs for MapView {
+    type Js = MapPicture;
+    fn to_js(self) -> MapPicture {
+        MapPicture(self)
+    }
+}
+
+fn thrown(error: impl std::fmt::Display) -> JsError {
+    JsError::new(&error.to_string())
+}
+
+macro_rules! bind {
+    ($($name:ident = $method:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
+        #[wasm_bindgen]
+        impl Engine {
+            $(
+                #[doc = concat!("See `", stringify!($method), "` of `domelight_page::Engine`.")]
+                ///
+                /// # Errors
+                /// As there.
+                #[wasm_bindgen(js_name = $name)]
+                pub fn $method(
+                    &mut self,
+                    $($argument: $type),*
+                ) -> Result<<$result as ToJs>::Js, JsError> {
+                    self.0.$method($($argument),*).map(ToJs::to_js).map_err(thrown)
+                }
+            )*
+        }
+    };
+}
+
+for_each_call!(bind);
 
 #[wasm_bindgen]
 impl Engine {
@@ -56,28 +82,111 @@ impl Engine {
     #[wasm_bindgen(constructor)]
     pub fn new() -> Self {
         std::panic::set_hook(Box::new(|info| panicked(&info.to_string())));
-        Self::default()
+        Self(domelight_page::Engine::new(Host::new(now, Some(MAX_MEMORY), Vec::new())))
     }
 
-    /// Keeps a file that a scene or a probe may be loaded from; `path` has slashes.
-    #[wasm_bindgen(js_name = addFile)]
-    pub fn add_file(&mut self, path: &str, bytes: Vec<u8>) {
-        self.files.add(path, bytes);
+    /// Begins a picture, or a shard of it; returns the strategy with the pilot's choices.
+    ///
+    /// # Errors
+    /// If there is nothing to render, or the settings are wrong.
+    pub fn start(&mut self, settings: &str) -> Result<String, JsError> {
+        self.0.start(settings).map_err(thrown)
     }
 
-    /// Forgets all files.
-    #[wasm_bindgen(js_name = clearFiles)]
-    pub fn clear_files(&mut self) {
-        self.files = Files::default();
+    /// Ends the render as near as its tiles allow to a number of shadow rays.
+    #[wasm_bindgen(js_name = setBudget)]
+    pub fn set_budget(&mut self, rays: f64) {
+        self.0.set_budget(rays);
     }
 
-    fn scene(&self) -> Result<&(Rc<Scene>, LoadedScene), JsError> {
-        self.scene.as_ref().ok_or_else(|| JsError::new("there is no scene yet; load one first"))
+    /// Renders for so many milliseconds, or until a pass or the budget ends.
+    ///
+    /// # Errors
+    /// If nothing was started.
+    pub fn step(&mut self, milliseconds: f64) -> Result<Update, JsError> {
+        self.0.step(milliseconds).map(Update).map_err(thrown)
+    }
+}
+
+impl Default for Engine {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[wasm_bindgen(js_class = MapView)]
+impl MapPicture {
+    /// Columns.
+    #[wasm_bindgen(getter)]
+    pub fn width(&self) -> usize {
+        self.0.width
     }
 
-    fn environment(&self) -> Result<&Rc<Environment>, JsError> {
-        let missing = || JsError::new("there is no environment yet; load one first");
-        self.environment.as_ref().ok_or_else(missing)
+    /// Rows.
+    #[wasm_bindgen(getter)]
+    pub fn height(&self) -> usize {
+        self.0.height
+    }
+
+    /// Takes R, G, B and alpha, or layer by layer, row by row.
+    pub fn pixels(&mut self) -> Vec<f32> {
+        std::mem::take(&mut self.0.pixels)
+    }
+
+    /// Takes the integral of each layer over the sphere.
+    pub fn integrals(&mut self) -> Vec<f64> {
+        std::mem::take(&mut self.0.integrals)
+    }
+}
+
+#[wasm_bindgen]
+impl Update {
+    /// Takes x, y, width and height of each tile that changed.
+    pub fn windows(&mut self) -> Vec<u32> {
+        std::mem::take(&mut self.0.windows)
+    }
+
+    /// Takes R, G, B and alpha of each tile's pixels, tile by tile and row by row.
+    pub fn pixels(&mut self) -> Vec<f32> {
+        std::mem::take(&mut self.0.pixels)
+    }
+
+    /// All samples of all pixels are there.
+    #[wasm_bindgen(getter)]
+    pub fn complete(&self) -> bool {
+        self.0.complete
+    }
+
+    /// The share of the camera samples that is done, in [0, 1].
+    #[wasm_bindgen(getter)]
+    pub fn progress(&self) -> f64 {
+        self.0.progress
+    }
+
+    /// The samples of each pixel at the end of a pass; 0 within one.
+    #[wasm_bindgen(getter)]
+    pub fn whole(&self) -> u32 {
+        self.0.whole
+    }
+
+    /// The time that it took to render \[ms\].
+    #[wasm_bindgen(getter)]
+    pub fn milliseconds(&self) -> f64 {
+        self.0.milliseconds
+    }
+
+    /// The render has reached its budget.
+    #[wasm_bindgen(getter)]
+    pub fn spent(&self) -> bool {
+        self.0.spent
+    }
+
+    /// Counts over the whole render, as JSON.
+    ///
+    /// # Errors
+    /// None.
+    pub fn statistics(&self) -> Result<String, JsError> {
+        serde_json::to_string(&self.0.statistics).map_err(thrown)
     }
 }
 

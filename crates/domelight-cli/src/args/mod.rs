@@ -12,6 +12,7 @@ pub(crate) mod render;
 pub(crate) mod render_run;
 pub(crate) mod tables;
 pub(crate) mod turntable;
+pub(crate) mod view;
 
 use crate::memory::MaxMemory;
 use crate::output::PicturePath;
@@ -133,6 +134,9 @@ pub(crate) enum Command {
     /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
     #[command(after_help = figures::EXAMPLES)]
     Figures(Box<figures::FiguresArguments>),
+    /// Look at a scene in a browser: the page of the browser edition, with this program as its engine.
+    #[command(after_help = view::EXAMPLES)]
+    View(Box<view::ViewArguments>),
     /// Write the browser edition, all of domelight in one page that needs no server.
     #[command(after_help = page::EXAMPLES)]
     Page(page::PageArguments),

@@ -11,10 +11,10 @@ use domelight::rig::{
     SphericalHarmonics, VarianceMinimization, extract, quadrature,
 };
 use serde::{Deserialize, Serialize};
-use wasm_bindgen::prelude::*;
 
+use crate::error::{error, refused};
 use crate::setup::{parse, to_json};
-use crate::{Engine, error};
+use crate::{Engine, Error};
 
 /// Lights that stand for the probe when it lights a sphere.
 const QUADRATURE: usize = 1 << 12;
@@ -96,7 +96,7 @@ fn dome_file(format: Format) -> &'static str {
 
 impl Engine {
     /// The rig of the settings in `json`, extracted unless it is the last one.
-    fn rig(&mut self, json: &str) -> Result<&Extraction, JsError> {
+    fn rig(&mut self, json: &str) -> Result<&Extraction, Error> {
         let extracted = match self.extraction.take() {
             Some((of, extraction)) if of == json => extraction,
             _ => {
@@ -115,13 +115,12 @@ impl Engine {
     }
 }
 
-#[wasm_bindgen]
 impl Engine {
     /// Divides the map into lights. Here and below, `json` is `{"method", "refine", "n", "sun", "lamps"}`.
     ///
     /// # Errors
     /// If there is no environment or no rig of it.
-    pub fn lights(&mut self, json: &str) -> Result<String, JsError> {
+    pub fn lights(&mut self, json: &str) -> Result<String, Error> {
         let environment = self.environment()?.clone();
         let extraction = self.rig(json)?;
         let reference = ShadingReference::new(&environment);
@@ -165,7 +164,7 @@ impl Engine {
     ///
     /// # Errors
     /// As for [`Self::lights`].
-    pub fn regions(&mut self, json: &str, width: usize) -> Result<Vec<u32>, JsError> {
+    pub fn regions(&mut self, json: &str, width: usize) -> Result<Vec<u32>, Error> {
         let rig: &Rig = &self.rig(json)?.rig;
         let height = width / 2;
         let at = |i: usize, n: usize, of: usize| (2 * i + 1) * of / (2 * n);
@@ -179,11 +178,8 @@ impl Engine {
     ///
     /// # Errors
     /// As for [`Self::lights`], or if there is no such format.
-    #[wasm_bindgen(js_name = rigFile)]
-    pub fn rig_file(&mut self, json: &str, format: &str, probe: &str) -> Result<Vec<u8>, JsError> {
-        let format: Format = format
-            .parse()
-            .map_err(|e: domelight::rig::export::UnknownFormat| JsError::new(&e.to_string()))?;
+    pub fn rig_file(&mut self, json: &str, format: &str, probe: &str) -> Result<Vec<u8>, Error> {
+        let format: Format = format.parse().map_err(refused)?;
         let orientation = self.environment()?.orientation();
         let extraction = self.rig(json)?;
         let residual = extraction.residual.as_ref();
@@ -193,33 +189,29 @@ impl Engine {
             file: Some(dome_file(format)),
         });
         let rig = RigExport { probe, orientation, lights: &extraction.rig.lights, dome };
-        format.encode(&rig).map_err(|e| JsError::new(&e.to_string()))
+        format.encode(&rig).map_err(refused)
     }
 
     /// The picture of what the lights leave of the map, as files of a format name it.
     ///
     /// # Errors
     /// As for [`Self::lights`], or if nothing is left, or there is no such file.
-    #[wasm_bindgen(js_name = domeFile)]
-    pub fn dome_file(&mut self, json: &str, name: &str) -> Result<Vec<u8>, JsError> {
-        let missing = || JsError::new("the lights take all of the map");
+    pub fn dome_file(&mut self, json: &str, name: &str) -> Result<Vec<u8>, Error> {
+        let missing = || refused("the lights take all of the map");
         let map = self.rig(json)?.residual.as_ref().ok_or_else(missing)?.radiance_map();
-        let failed = |e: String| JsError::new(&e);
         match name {
             "dome.hdr" => {
                 let mut bytes = Vec::new();
-                hdr::encode(&map, &mut bytes).map_err(|e| failed(e.to_string()))?;
+                hdr::encode(&map, &mut bytes).map_err(refused)?;
                 Ok(bytes)
             }
             "dome_octahedral.exr" => {
                 let size = Mapping::Octahedral.size_for(map.height);
                 let converted = from_lat_long(&map, Mapping::Octahedral, size);
-                ExrLayers::from_image(&converted, None).encode().map_err(|e| failed(e.to_string()))
+                ExrLayers::from_image(&converted, None).encode().map_err(refused)
             }
-            "dome.exr" => {
-                ExrLayers::from_image(&map, None).encode().map_err(|e| failed(e.to_string()))
-            }
-            _ => Err(failed(format!("there is no picture {name} of a dome"))),
+            "dome.exr" => ExrLayers::from_image(&map, None).encode().map_err(refused),
+            _ => Err(refused(format!("there is no picture {name} of a dome"))),
         }
     }
 
@@ -228,7 +220,7 @@ impl Engine {
     ///
     /// # Errors
     /// As for [`Self::lights`].
-    pub fn spheres(&mut self, json: &str, size: usize, exponent: i32) -> Result<Vec<f32>, JsError> {
+    pub fn spheres(&mut self, json: &str, size: usize, exponent: i32) -> Result<Vec<f32>, Error> {
         let truth = quadrature(self.environment()?, QUADRATURE);
         let extraction = self.rig(json)?;
         let mut approximate = extraction.rig.clone().lights;

@@ -9,11 +9,10 @@ use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::render::{Checkpoint, Layers, Passes, Provenance, RenderSettings, VarianceSums};
 use domelight::strategy::StrategySpec;
 use serde::Deserialize;
-use wasm_bindgen::prelude::*;
 
-use crate::Engine;
-use crate::session::nothing_started;
+use crate::error::refused;
 use crate::setup::parse;
+use crate::{Engine, Error};
 
 /// The provenance of a picture, as the page knows it.
 #[derive(Deserialize)]
@@ -27,15 +26,14 @@ struct Making {
     exposure: f32,
 }
 
-#[wasm_bindgen]
 impl Engine {
     /// The sums of this Worker's shard as a part of the picture, for [`Engine::add_part`] of another.
     ///
     /// # Errors
     /// If nothing was started.
-    pub fn part(&self) -> Result<Vec<u8>, JsError> {
-        let session = self.session.as_ref().ok_or_else(nothing_started)?;
-        let checkpoint = session.with(|_, renderer| Checkpoint {
+    pub fn part(&self) -> Result<Vec<u8>, Error> {
+        let rendering = self.rendering.as_ref().ok_or(Error::NothingStarted)?;
+        let checkpoint = rendering.with(|renderer| Checkpoint {
             identity: Vec::new(),
             provenance: vec![(
                 "strategy".to_owned(),
@@ -48,16 +46,15 @@ impl Engine {
             counts: renderer.counts(),
             film: renderer.film(),
         });
-        checkpoint.encode().map_err(|e| JsError::new(&e.to_string()))
+        checkpoint.encode().map_err(refused)
     }
 
     /// Keeps a part.
     ///
     /// # Errors
     /// If it is damaged.
-    #[wasm_bindgen(js_name = addPart)]
-    pub fn add_part(&mut self, bytes: &[u8]) -> Result<(), JsError> {
-        self.parts.push(Checkpoint::decode(bytes).map_err(|e| JsError::new(&e.to_string()))?);
+    pub fn add_part(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.parts.push(Checkpoint::decode(bytes).map_err(refused)?);
         Ok(())
     }
 
@@ -66,7 +63,7 @@ impl Engine {
     ///
     /// # Errors
     /// If there are no parts.
-    pub fn exr(&mut self, making: &str) -> Result<Vec<u8>, JsError> {
+    pub fn exr(&mut self, making: &str) -> Result<Vec<u8>, Error> {
         let Making { scene, environment, samples, seed, exposure } = parse(making)?;
         let (layers, parts) = self.merged()?;
         let strategy = parts[0].provenance.iter().find(|(name, _)| name == "strategy");
@@ -88,7 +85,7 @@ impl Engine {
         attributes.push(("domelight.complete".to_owned(), complete.to_string()));
         let mut bytes = Cursor::new(Vec::new());
         let written = layers.write_exr(&attributes, &mut bytes);
-        written.map_err(|e| JsError::new(&e.to_string()))?;
+        written.map_err(refused)?;
         Ok(bytes.into_inner())
     }
 
@@ -96,21 +93,20 @@ impl Engine {
     ///
     /// # Errors
     /// If there are no parts or no such curve.
-    pub fn png(&mut self, exposure: f32, curve: &str) -> Result<Vec<u8>, JsError> {
+    pub fn png(&mut self, exposure: f32, curve: &str) -> Result<Vec<u8>, Error> {
         let (layers, _) = self.merged()?;
         let alpha = layers.alpha.iter().any(|&a| a < 1.0).then_some(&layers.alpha[..]);
-        let curve = ToneCurve::from_str(curve).map_err(|e| JsError::new(&e.to_string()))?;
+        let curve = ToneCurve::from_str(curve).map_err(refused)?;
         let exposure = if exposure.is_nan() { Exposure::Auto } else { Exposure::Stops(exposure) };
         let tone = ToneMapping { exposure: exposure.stops(&layers.color, alpha), curve };
         let mut bytes = Vec::new();
-        png::encode(&layers.color, alpha, &tone, Depth::Eight, &mut bytes)
-            .map_err(|e| JsError::new(&e.to_string()))?;
+        png::encode(&layers.color, alpha, &tone, Depth::Eight, &mut bytes).map_err(refused)?;
         Ok(bytes)
     }
 
-    fn merged(&mut self) -> Result<(Layers, Vec<Checkpoint>), JsError> {
+    fn merged(&mut self) -> Result<(Layers, Vec<Checkpoint>), Error> {
         let parts = std::mem::take(&mut self.parts);
-        let first = parts.first().ok_or_else(|| JsError::new("there are no parts"))?;
+        let first = parts.first().ok_or_else(|| refused("there are no parts"))?;
         let (width, height) = (first.film.width, first.film.height);
         let mut variance = VarianceSums::default();
         for part in &parts {
@@ -119,7 +115,7 @@ impl Engine {
         let mut layers = Layers::new(width, height);
         for part in &parts {
             if (part.film.width, part.film.height) != (width, height) {
-                return Err(JsError::new("the parts are of different pictures"));
+                return Err(refused("the parts are of different pictures"));
             }
             layers.merge(&part.film, 0, &variance);
         }

@@ -1,10 +1,9 @@
 //! The places of one direction in all of the page's pictures of directions.
 
 use domelight::math::{Vec3, vec2};
-use wasm_bindgen::prelude::*;
 
-use crate::Engine;
 use crate::map::mapping_of;
+use crate::{Engine, Error};
 
 /// The axes of the map of a hemisphere: to the right, to the top, and the normal.
 type Axes = [Vec3; 3];
@@ -24,7 +23,6 @@ fn place([x_axis, y_axis, normal]: Axes, wi: Vec3) -> Option<[f32; 2]> {
     (cos > 0.0).then(|| [x_axis.dot(wi) * scale, y_axis.dot(wi) * scale])
 }
 
-#[wasm_bindgen]
 impl Engine {
     /// The places of a direction on the map in `mapping`, u and v, and on the hemisphere above a pixel, x to the right and y
     /// up in \[−1, 1\], both NaN below its horizon. `pixel` is as for [`Engine::inspect`], or empty. The direction is at (a, b)
@@ -32,7 +30,6 @@ impl Engine {
     ///
     /// # Errors
     /// If scene or environment are missing, the pixel is outside, or there is no such mapping.
-    #[wasm_bindgen(js_name = directionAt)]
     pub fn direction_at(
         &self,
         pixel: &str,
@@ -40,7 +37,7 @@ impl Engine {
         a: f32,
         b: f32,
         mapping: &str,
-    ) -> Result<Vec<f32>, JsError> {
+    ) -> Result<Vec<f32>, Error> {
         let upright = self.environment()?.orientation().up.from_y_up();
         let axes = if pixel.is_empty() { None } else { self.axes(pixel)? };
         let wi = match from {

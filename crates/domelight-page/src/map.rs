@@ -1,24 +1,24 @@
 //! Pictures on the sphere of directions: the map, and what one pixel makes of it.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use domelight::Rgb;
-use domelight::environment::mapping::{Mapping, UnknownMapping};
+use domelight::environment::mapping::Mapping;
 use domelight::environment::{Environment, LatLongGrid, Orientation, UpAxis};
 use domelight::geometry::{Hit, Ray};
 use domelight::math::{Vec3, vec2};
 use domelight::render::visibility;
 use domelight::sampling::{Sampler, SamplerKind};
-use domelight::scene::{Camera, Scene};
+use domelight::scene::Camera;
 use domelight::strategy::{
     Estimator, PixelPoints, Portal, PreparedStrategy, ShadingPoint, Strategy, StrategySpec,
     TileShading,
 };
 use serde::{Deserialize, Serialize};
-use wasm_bindgen::prelude::*;
 
-use crate::setup::{CameraState, parse, to_json};
-use crate::{Engine, error};
+use crate::error::{error, refused};
+use crate::setup::{CameraState, LoadedScene, parse, to_json};
+use crate::{Engine, Error};
 
 /// A pixel of a picture.
 #[derive(Deserialize)]
@@ -45,14 +45,14 @@ struct PointReport {
 
 /// The shading point in the middle of a pixel.
 struct Picked {
-    scene: Rc<Scene>,
+    scene: Arc<LoadedScene>,
     at: ShadingPoint,
 }
 
 impl Picked {
     /// V in [0, 1] toward each direction.
     fn visibility(&self, directions: &[Vec3]) -> Vec<f32> {
-        visibility(&self.scene, &self.at, directions)
+        visibility(&self.scene.scene, &self.at, directions)
     }
 }
 
@@ -90,8 +90,8 @@ fn size(mapping: Mapping, width: usize) -> (usize, usize) {
     mapping.size_of([width, width / 2])
 }
 
-pub(crate) fn mapping_of(name: &str) -> Result<Mapping, JsError> {
-    name.parse().map_err(|e: UnknownMapping| JsError::new(&e.to_string()))
+pub(crate) fn mapping_of(name: &str) -> Result<Mapping, Error> {
+    name.parse().map_err(refused)
 }
 
 /// The directions of the texels' centers of a lat-long map, with their solid angles.
@@ -214,19 +214,19 @@ fn shadow_rays(
 
 impl Engine {
     /// What the middle of a pixel shows of the scene.
-    fn sight(&self, json: &str) -> Result<Option<(Ray, Hit)>, JsError> {
+    fn sight(&self, json: &str) -> Result<Option<(Ray, Hit)>, Error> {
         let Pixel { x, y, width, height, camera } = parse(json)?;
-        let (scene, loaded) = self.scene()?;
-        let view = loaded.camera(scene, camera, width as f32 / height.max(1) as f32);
+        let scene = self.scene()?;
+        let view = scene.camera(camera, width as f32 / height.max(1) as f32);
         let camera = Camera::new(&view, width, height).map_err(error)?;
         let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
-        Ok(scene.camera_hit(&ray, 0, 0).map(|hit| (ray, hit)))
+        Ok(scene.scene.camera_hit(&ray, 0, 0).map(|hit| (ray, hit)))
     }
 
-    fn pick(&self, json: &str) -> Result<Option<Picked>, JsError> {
-        let (scene, sight) = (&self.scene()?.0, self.sight(json)?);
+    fn pick(&self, json: &str) -> Result<Option<Picked>, Error> {
+        let (scene, sight) = (self.scene()?, self.sight(json)?);
         let picked =
-            |(ray, hit)| Picked { at: scene.shading_point(&ray, &hit), scene: scene.clone() };
+            |(ray, hit)| Picked { at: scene.scene.shading_point(&ray, &hit), scene: scene.clone() };
         Ok(sight.map(picked))
     }
 
@@ -236,7 +236,7 @@ impl Engine {
         strategy: &str,
         picked: &Picked,
         seed: u64,
-    ) -> Result<PreparedStrategy<'_>, JsError> {
+    ) -> Result<PreparedStrategy<'_>, Error> {
         let spec: StrategySpec = strategy.parse().map_err(error)?;
         let environment = self.environment()?;
         let at = picked.at;
@@ -247,43 +247,25 @@ impl Engine {
 }
 
 /// A picture on the sphere of directions.
-#[wasm_bindgen]
+#[derive(Clone, Debug, Default)]
 pub struct MapView {
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    pixels: Vec<f32>,
-    integrals: Vec<f64>,
-}
-
-impl MapView {
-    fn empty() -> Self {
-        Self { width: 0, height: 0, pixels: Vec::new(), integrals: Vec::new() }
-    }
-}
-
-#[wasm_bindgen]
-impl MapView {
     /// R, G, B and alpha, or layer by layer, row by row.
-    pub fn pixels(&self) -> Vec<f32> {
-        self.pixels.clone()
-    }
-
+    pub pixels: Vec<f32>,
     /// The integral of each layer over the sphere, where the layers have integrals.
-    pub fn integrals(&self) -> Vec<f64> {
-        self.integrals.clone()
-    }
+    pub integrals: Vec<f64>,
 }
 
-#[wasm_bindgen]
 impl Engine {
     /// The map as the probe has it, not turned: R, G and B of `width` columns and half as many rows, each the mean over
     /// its texels.
     ///
     /// # Errors
     /// If there is no environment.
-    pub fn map(&self, width: usize) -> Result<Vec<f32>, JsError> {
+    pub fn map(&self, width: usize) -> Result<Vec<f32>, Error> {
         let map = self.environment()?.map();
         let height = width / 2;
         let range = |i: usize, n: usize, of: usize| {
@@ -312,8 +294,7 @@ impl Engine {
     ///
     /// # Errors
     /// If there is no environment or no such mapping.
-    #[wasm_bindgen(js_name = mapView)]
-    pub fn map_view(&self, mapping: &str, rotate: f32, width: usize) -> Result<MapView, JsError> {
+    pub fn map_view(&self, mapping: &str, rotate: f32, width: usize) -> Result<MapView, Error> {
         let mapping = mapping_of(mapping)?;
         let environment = self.environment()?;
         let orientation = Orientation { rotation: rotate, ..environment.orientation() };
@@ -349,13 +330,7 @@ impl Engine {
     ///
     /// # Errors
     /// If there is no environment or no such mapping.
-    #[wasm_bindgen(js_name = placesOf)]
-    pub fn places_of(
-        &self,
-        mapping: &str,
-        rotate: f32,
-        places: &[f32],
-    ) -> Result<Vec<f32>, JsError> {
+    pub fn places_of(&self, mapping: &str, rotate: f32, places: &[f32]) -> Result<Vec<f32>, Error> {
         let mapping = mapping_of(mapping)?;
         let orientation = self.environment()?.orientation();
         let turned = Orientation { rotation: rotate, ..orientation };
@@ -375,10 +350,10 @@ impl Engine {
     ///
     /// # Errors
     /// If scene or environment are missing, or there is no such mapping.
-    pub fn importance(&self, pixel: &str, mapping: &str, width: usize) -> Result<MapView, JsError> {
+    pub fn importance(&self, pixel: &str, mapping: &str, width: usize) -> Result<MapView, Error> {
         const VISIBILITY: usize = 2;
         let mapping = mapping_of(mapping)?;
-        let Some(picked) = self.pick(pixel)? else { return Ok(MapView::empty()) };
+        let Some(picked) = self.pick(pixel)? else { return Ok(MapView::default()) };
         let environment = self.environment()?;
         let unit = environment.unit() as f32;
         let layers = |wi: Vec3, light: Rgb, of_light: f32| {
@@ -438,27 +413,26 @@ impl Engine {
     ///
     /// # Errors
     /// If scene or environment are missing, the strategy does not suit them, or there is no such mapping.
-    #[wasm_bindgen(js_name = rayDensity)]
     pub fn ray_density(
         &self,
         pixel: &str,
         strategy: &str,
         mapping: &str,
         width: usize,
-    ) -> Result<MapView, JsError> {
+    ) -> Result<MapView, Error> {
         /// Pixels with other random numbers, camera samples of each, and columns of the cells that are counted in.
         const REPLICATES: u64 = 64;
         const SAMPLES: u32 = 32;
         const CELLS: usize = 64;
         let mapping = mapping_of(mapping)?;
-        let Some(picked) = self.pick(pixel)? else { return Ok(MapView::empty()) };
+        let Some(picked) = self.pick(pixel)? else { return Ok(MapView::default()) };
         let environment = self.environment()?;
         let strategy = self.prepared(strategy, &picked, 0)?;
         let mut counts = RayCounts::new(CELLS);
         let visible = |wi: &[Vec3]| picked.visibility(wi);
         for seed in 0..REPLICATES {
             let count = |wi, _, _| counts.add(wi);
-            let portals = picked.scene.portals();
+            let portals = picked.scene.scene.portals();
             shadow_rays(&picked.at, &strategy, portals, (SAMPLES, seed), visible, count);
         }
         let texels = Texels::new(mapping, width, environment.orientation().up);
@@ -471,9 +445,8 @@ impl Engine {
     ///
     /// # Errors
     /// If the scene is missing.
-    #[wasm_bindgen(js_name = materialAt)]
-    pub fn material_at(&self, pixel: &str) -> Result<Option<u32>, JsError> {
-        let scene = &self.scene()?.0;
+    pub fn material_at(&self, pixel: &str) -> Result<Option<u32>, Error> {
+        let scene = &self.scene()?.scene;
         Ok(self.sight(pixel)?.map(|(_, hit)| scene.material_of(&hit) as u32))
     }
 
@@ -481,7 +454,7 @@ impl Engine {
     ///
     /// # Errors
     /// If scene or environment are missing.
-    pub fn point(&self, pixel: &str) -> Result<String, JsError> {
+    pub fn point(&self, pixel: &str) -> Result<String, Error> {
         let Some(picked) = self.pick(pixel)? else { return Ok("null".to_owned()) };
         let environment = self.environment()?;
         let (all, solid_angles): (Vec<Vec3>, Vec<f64>) = directions(256).unzip();
@@ -512,20 +485,27 @@ impl Engine {
         pixel: &str,
         strategy: &str,
         mapping: &str,
-        n: u32,
+        n: usize,
         seed: u32,
-    ) -> Result<Vec<f32>, JsError> {
+    ) -> Result<Vec<f32>, Error> {
         let mapping = mapping_of(mapping)?;
         let Some(picked) = self.pick(pixel)? else { return Ok(Vec::new()) };
         let strategy = self.prepared(strategy, &picked, seed.into())?;
         let from_world = self.environment()?.orientation().up.from_y_up().transpose();
         let visible = |wi: &[Vec3]| picked.visibility(wi);
         let mut out = Vec::new();
-        let portals = picked.scene.portals();
-        shadow_rays(&picked.at, &strategy, portals, (n, seed.into()), visible, |wi, weight, v| {
-            let uv = mapping.uv(from_world * wi);
-            out.extend([uv.x, uv.y, weight.luminance(), v]);
-        });
+        let portals = picked.scene.scene.portals();
+        shadow_rays(
+            &picked.at,
+            &strategy,
+            portals,
+            (n as u32, seed.into()),
+            visible,
+            |wi, weight, v| {
+                let uv = mapping.uv(from_world * wi);
+                out.extend([uv.x, uv.y, weight.luminance(), v]);
+            },
+        );
         Ok(out)
     }
 }

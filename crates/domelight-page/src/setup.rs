@@ -1,39 +1,35 @@
 //! What is rendered: the page's settings, and the scene and light that they name.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::rc::Rc;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
-use domelight::Rgb;
 use domelight::bsdf::{Bsdf, MaterialSpec};
-use domelight::environment::UpAxis;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, probe_from_bytes, reduced_probe_from_bytes};
+use domelight::environment::{Environment, UpAxis};
 use domelight::math::Vec3;
 use domelight::picture::{memory_to_read, reduced_size};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
     CameraSettings, EnvironmentSettings, EnvironmentSource, Framing, Layers, LoadOptions, Material,
-    MaterialModel, Projection, Scene, SceneDescription, load_bytes,
+    MaterialModel, Projection, Scene, SceneDescription, load_bytes, load_with,
 };
+use domelight::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
-use wasm_bindgen::prelude::*;
 
-use crate::{Engine, error};
-
-/// The most that a scene and its textures take: an instance of WebAssembly has 4 GiB at the most, and builds a
-/// hierarchy beside them \[bytes\].
-const MAX_SCENE_MEMORY: u64 = 1 << 30;
-/// The most that reading a probe takes \[bytes\].
-const MAX_PROBE_MEMORY: u64 = 1 << 30;
+use crate::error::{error, refused};
+use crate::{Engine, Error};
 
 /// The settings of [`Engine::load_scene`].
-#[derive(Clone, Default, Deserialize)]
+#[derive(Clone, PartialEq, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub(crate) struct Setup {
     /// A built-in scene, or a file.
-    pub(crate) scene: String,
+    scene: String,
     /// The subject's, as `--material` has it; empty leaves what the scene brings.
     material: String,
     /// Single materials of the scene by their index, which the subject's leaves alone.
@@ -44,10 +40,10 @@ pub(crate) struct Setup {
 
 impl Setup {
     /// Replaces the materials that the settings name.
-    fn replace_materials(&self, description: &mut SceneDescription) -> Result<(), JsError> {
+    fn replace_materials(&self, description: &mut SceneDescription) -> Result<(), Error> {
         let parsed = |text: &str| {
             let material: MaterialSpec = text.parse().map_err(error)?;
-            Ok::<_, JsError>(Bsdf::from(material))
+            Ok::<_, Error>(Bsdf::from(material))
         };
         let n = description.materials.len();
         let own: Vec<usize> = description.parts.iter().map(|part| part.material).collect();
@@ -55,7 +51,7 @@ impl Setup {
             description.set_subject_material(parsed(&self.material)?);
         }
         for (&index, text) in &self.materials {
-            let missing = || JsError::new(&format!("material {index}: the scene has only {n}"));
+            let missing = || refused(format!("material {index}: the scene has only {n}"));
             let material = description.materials[..n].get_mut(index).ok_or_else(missing)?;
             // The outline of a leaf and its relief stay.
             material.model = MaterialModel::Fixed(parsed(text)?);
@@ -71,8 +67,11 @@ impl Setup {
     }
 }
 
-/// What is known of a scene beside its geometry.
+/// A scene, and what is known of it beside its geometry.
 pub(crate) struct LoadedScene {
+    pub(crate) scene: Scene,
+    /// What the page hears of it.
+    report: String,
     up: UpAxis,
     camera: Option<CameraSettings>,
     /// What the scene was scaled by.
@@ -114,16 +113,11 @@ impl CameraState {
 }
 
 impl LoadedScene {
-    /// The camera that was asked for, or else the scene's own, or one framed to `scene`.
-    pub(crate) fn camera(
-        &self,
-        scene: &Scene,
-        asked: Option<CameraState>,
-        aspect: f32,
-    ) -> CameraSettings {
+    /// The camera that was asked for, or else the scene's own, or one framed to it.
+    pub(crate) fn camera(&self, asked: Option<CameraState>, aspect: f32) -> CameraSettings {
         let own = asked.map(CameraState::settings).or(self.camera);
         let Some(mut camera) = own else {
-            return scene.framed(&Framing::new(aspect, self.up.vector()));
+            return self.scene.framed(&Framing::new(aspect, self.up.vector()));
         };
         if self.scale != 1.0 {
             camera.scale(self.scale);
@@ -211,9 +205,9 @@ struct LightReport {
 }
 
 /// The settings of [`Engine::load_environment`].
-#[derive(Deserialize)]
+#[derive(Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Light {
+pub(crate) struct Light {
     /// A built-in probe, or a file.
     probe: String,
     /// Rows of a built-in probe.
@@ -239,6 +233,13 @@ struct SmallerMap {
     size: [usize; 2],
 }
 
+/// A light, and what the page hears of it.
+#[derive(Clone)]
+pub(crate) struct LoadedLight {
+    pub(crate) environment: Arc<Environment>,
+    report: String,
+}
+
 /// What a probe is, for the page.
 #[derive(Serialize)]
 struct ProbeReport {
@@ -247,8 +248,8 @@ struct ProbeReport {
 }
 
 /// Reads the page's settings.
-pub(crate) fn parse<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, JsError> {
-    serde_json::from_str(json).map_err(|e| JsError::new(&format!("settings: {e}")))
+pub(crate) fn parse<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, Error> {
+    Ok(serde_json::from_str(json)?)
 }
 
 /// Writes what the page reads.
@@ -256,29 +257,59 @@ pub(crate) fn to_json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
-#[wasm_bindgen]
 impl Engine {
     /// Loads and builds a scene: `{"scene", "material", "materials", "ground"}`; returns what it brings.
     ///
     /// # Errors
     /// If there is no such scene, its file is damaged, or the material is none.
-    #[wasm_bindgen(js_name = loadScene)]
-    pub fn load_scene(&mut self, json: &str) -> Result<String, JsError> {
+    pub fn load_scene(&mut self, json: &str) -> Result<String, Error> {
         let setup: Setup = parse(json)?;
-        let (mut description, warnings) = if let Ok(scene) = BuiltinScene::from_str(&setup.scene) {
-            (scene.description(), Vec::new())
+        let make = || self.built(&setup);
+        // Files that the page gives are each engine's own.
+        let scene = if self.files.is_empty() {
+            self.host.shared.scenes.get_or_make(setup.clone(), make)?
         } else {
-            let options =
-                LoadOptions { max_memory: Some(MAX_SCENE_MEMORY), ..LoadOptions::default() };
-            let path = Path::new(&setup.scene);
-            let bytes = self
-                .files
-                .get(path)
-                .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
-            let resolver = |path: &Path| self.files.get(path).map(<[u8]>::to_vec);
-            let loaded = load_bytes(path, bytes, &resolver, &options).map_err(error)?;
-            (loaded.description, loaded.warnings)
+            Arc::new(make()?)
         };
+        let report = scene.report.clone();
+        self.rendering = None;
+        self.scene = Some(scene);
+        Ok(report)
+    }
+
+    /// Reads a scene, with warnings.
+    fn described(&self, name: &str) -> Result<(SceneDescription, Vec<String>), Error> {
+        if let Ok(scene) = BuiltinScene::from_str(name) {
+            return Ok((scene.description(), Vec::new()));
+        }
+        let options = LoadOptions { max_memory: self.host.max_memory, ..LoadOptions::default() };
+        let path = Path::new(name);
+        let loaded = if self.is_on_disk(path) {
+            self.host.reads([path]);
+            let loaded = load_with(path, &options).map_err(error)?;
+            self.host.reads(loaded.files.iter().map(PathBuf::as_path));
+            if let Some(EnvironmentSource::File(map)) =
+                loaded.description.environment.as_ref().map(|light| &light.source)
+            {
+                self.host.allow_map(map);
+            }
+            loaded
+        } else {
+            let bytes = self.given(path)?;
+            let resolver = |path: &Path| self.files.get(path).map(<[u8]>::to_vec);
+            load_bytes(path, bytes, &resolver, &options).map_err(error)?
+        };
+        Ok((loaded.description, loaded.warnings))
+    }
+
+    /// The bytes of a file that the page has given.
+    fn given(&self, path: &Path) -> Result<&[u8], Error> {
+        let cannot = |e| refused(format!("cannot read {}: {e}", path.display()));
+        self.files.get(path).map_err(cannot)
+    }
+
+    fn built(&self, setup: &Setup) -> Result<LoadedScene, Error> {
+        let (mut description, warnings) = self.described(&setup.scene)?;
         let materials = MaterialReport::of(&description);
         setup.replace_materials(&mut description)?;
         let up = description.up.unwrap_or_default();
@@ -317,82 +348,114 @@ impl Engine {
             up: up.vector().to_array(),
             environment: light,
         };
-        self.session = None;
-        self.scene = Some((Rc::new(scene), LoadedScene { up, camera, scale }));
-        self.setup = setup;
-        Ok(to_json(&report))
+        Ok(LoadedScene { scene, report: to_json(&report), up, camera, scale })
     }
 
     /// Loads a probe: `{"probe", "rows", "reduce", "rotate", "scale", "exposure"}`; returns its size and what was repaired.
     ///
     /// # Errors
     /// If there is no such probe or its file is damaged.
-    #[wasm_bindgen(js_name = loadEnvironment)]
-    pub fn load_environment(&mut self, json: &str) -> Result<String, JsError> {
+    pub fn load_environment(&mut self, json: &str) -> Result<String, Error> {
         let light: Light = parse(json)?;
-        let (image, warnings) = if let Ok(probe) = BuiltinProbe::from_str(&light.probe) {
-            (probe.image(light.rows.clamp(1, 4096)), Vec::new())
+        let up = self.scene.as_ref().map_or(UpAxis::Y, |scene| scene.up);
+        let loaded = self.kept_light(light.clone(), up, || self.read_light(&light, up))?;
+        let report = loaded.report.clone();
+        self.set_light(light, loaded);
+        Ok(report)
+    }
+
+    fn set_light(&mut self, light: Light, loaded: Arc<LoadedLight>) {
+        self.rendering = None;
+        self.extraction = None;
+        self.prefiltered = None;
+        self.light = Some((light, loaded));
+    }
+
+    /// The light of some settings, which other engines share. Files that the page gives are each engine's own.
+    fn kept_light(
+        &self,
+        light: Light,
+        up: UpAxis,
+        make: impl FnOnce() -> Result<LoadedLight, Error>,
+    ) -> Result<Arc<LoadedLight>, Error> {
+        if self.files.is_empty() {
+            self.host.shared.lights.get_or_make((light, up), make)
         } else {
-            let path = Path::new(&light.probe);
-            let bytes = self
-                .files
-                .get(path)
-                .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
-            let options =
-                ProbeOptions { max_memory: Some(MAX_PROBE_MEMORY), ..ProbeOptions::default() };
-            let name = &light.probe;
-            let probe = match light.reduce {
-                1 => probe_from_bytes(bytes, name, &options),
-                factor => reduced_probe_from_bytes(bytes, name, factor, &options),
-            };
-            let probe = probe.map_err(error)?;
-            (probe.image, probe.warnings)
-        };
-        let up = self.scene.as_ref().map_or(UpAxis::Y, |(_, loaded)| loaded.up);
+            make().map(Arc::new)
+        }
+    }
+
+    fn read_light(&self, light: &Light, up: UpAxis) -> Result<LoadedLight, Error> {
+        let (image, warnings) = self.read_map(light)?;
         let settings = EnvironmentSettings {
             rotate_degrees: light.rotate,
             scale: light.scale,
             exposure: light.exposure,
-            ..EnvironmentSettings::new(EnvironmentSource::Builtin(light.probe), up)
+            ..EnvironmentSettings::new(EnvironmentSource::Builtin(light.probe.clone()), up)
         };
         let environment = settings.environment(image).map_err(error)?;
         let map = environment.map();
-        let report = ProbeReport { size: [map.width, map.height], warnings };
-        self.session = None;
-        self.extraction = None;
-        self.prefiltered = None;
-        self.environment = Some(Rc::new(environment));
-        Ok(to_json(&report))
+        let report = to_json(&ProbeReport { size: [map.width, map.height], warnings });
+        Ok(LoadedLight { environment: Arc::new(environment), report })
+    }
+
+    /// The map of a probe, with warnings.
+    fn read_map(&self, light: &Light) -> Result<(RgbImage, Vec<String>), Error> {
+        if let Ok(probe) = BuiltinProbe::from_str(&light.probe) {
+            return Ok((probe.image(light.rows.clamp(1, 4096)), Vec::new()));
+        }
+        let bytes = self.bytes_of(Path::new(&light.probe))?;
+        let options = ProbeOptions { max_memory: self.host.max_memory, ..ProbeOptions::default() };
+        let probe = match light.reduce {
+            1 => probe_from_bytes(&bytes, &light.probe, &options),
+            factor => reduced_probe_from_bytes(&bytes, &light.probe, factor, &options),
+        };
+        let probe = probe.map_err(error)?;
+        Ok((probe.image, probe.warnings))
+    }
+
+    /// The bytes of a file, of the disk or given by the page.
+    fn bytes_of(&self, path: &Path) -> Result<Cow<'_, [u8]>, Error> {
+        if !self.is_on_disk(path) {
+            return self.given(path).map(Cow::Borrowed);
+        }
+        self.host.reads([path]);
+        let cannot = |e| refused(format!("cannot read {}: {e}", path.display()));
+        fs::read(path).map(Cow::Owned).map_err(cannot)
     }
 
     /// The sizes, at most half the file's, at which its map can be read where it needs too much memory as a whole: JSON of
     /// `{"reduce", "size"}`, the largest first. None for other files.
-    #[wasm_bindgen(js_name = smallerMaps)]
-    pub fn smaller_maps(&self, probe: &str) -> String {
-        let bytes = self.files.get(Path::new(probe)).unwrap_or_default();
-        let is_too_large = memory_to_read(bytes).is_ok_and(|needed| needed > MAX_PROBE_MEMORY);
+    ///
+    /// # Errors
+    /// None.
+    pub fn smaller_maps(&self, probe: &str) -> Result<String, Error> {
+        let bytes = self.bytes_of(Path::new(probe)).unwrap_or_default();
+        let fits = |needed: u64| self.host.max_memory.is_none_or(|most| needed <= most);
+        let is_too_large = memory_to_read(&bytes).is_ok_and(|needed| !fits(needed));
         let sizes = [2, 4, 8].into_iter().filter_map(|reduce| {
-            let ((width, height), needed) = reduced_size(bytes, reduce).ok()?;
-            let fits = is_too_large && needed <= MAX_PROBE_MEMORY;
-            fits.then_some(SmallerMap { reduce, size: [width, height] })
+            let ((width, height), needed) = reduced_size(&bytes, reduce).ok()?;
+            (is_too_large && fits(needed)).then_some(SmallerMap { reduce, size: [width, height] })
         });
-        to_json(&sizes.collect::<Vec<_>>())
+        Ok(to_json(&sizes.collect::<Vec<_>>()))
     }
 
     /// Turns the environment \[degrees\]; the map is not read again.
     ///
     /// # Errors
     /// If there is no environment or the angle is not finite.
-    #[wasm_bindgen(js_name = turnEnvironment)]
-    pub fn turn_environment(&mut self, rotate: f32) -> Result<(), JsError> {
-        self.session = None;
-        self.extraction = None;
-        self.prefiltered = None;
-        let missing = || JsError::new("there is no environment yet; load one first");
-        let environment = self.environment.take().ok_or_else(missing)?;
-        let environment = Rc::unwrap_or_clone(environment);
-        let by = rotate - environment.orientation().rotation;
-        self.environment = Some(Rc::new(environment.rotated(by).map_err(error)?));
+    pub fn turn_environment(&mut self, rotate: f32) -> Result<(), Error> {
+        let (light, loaded) = self.light.take().ok_or(Error::NoEnvironment)?;
+        let light = Light { rotate, ..light };
+        let orientation = loaded.environment.orientation();
+        let turned = self.kept_light(light.clone(), orientation.up, || {
+            // No copy where nobody shares it.
+            let LoadedLight { environment, report } = Arc::unwrap_or_clone(loaded);
+            let environment = Arc::unwrap_or_clone(environment);
+            let environment = environment.rotated(rotate - orientation.rotation).map_err(error)?;
+            Ok(LoadedLight { environment: Arc::new(environment), report })
+        })?;
+        self.set_light(light, turned);
         Ok(())
     }
 }

@@ -7,10 +7,10 @@ use domelight::render::RenderSettings;
 use domelight::scene::Camera;
 use domelight::strategy::{PreparedStrategy, StrategySpec};
 use serde::{Deserialize, Serialize};
-use wasm_bindgen::prelude::*;
 
+use crate::error::{error, refused};
 use crate::setup::{CameraState, parse, to_json};
-use crate::{Engine, error};
+use crate::{Engine, Error};
 
 /// Pixels along an edge of a strategy's directions.
 const DIRECTIONS: usize = 64;
@@ -55,19 +55,19 @@ impl Engine {
     fn inspected<T>(
         &self,
         json: &str,
-        f: impl FnOnce(&Inspector<'_>, &InspectState) -> Result<T, JsError>,
-    ) -> Result<T, JsError> {
+        f: impl FnOnce(&Inspector<'_>, &InspectState) -> Result<T, Error>,
+    ) -> Result<T, Error> {
         let state: InspectState = parse(json)?;
-        let (scene, loaded) = self.scene()?;
+        let scene = self.scene()?;
         let environment = self.environment()?;
         let (width, height) = (state.width, state.height);
-        let view = loaded.camera(scene, state.camera, width as f32 / height.max(1) as f32);
+        let view = scene.camera(state.camera, width as f32 / height.max(1) as f32);
         let camera = Camera::new(&view, width, height).map_err(error)?;
         let settings =
             RenderSettings { width, height, seed: state.seed, ..RenderSettings::default() };
         let pixel = [state.x, state.y];
-        let inspector = Inspector::new(scene, &camera, environment, &settings, pixel)
-            .map_err(|e| JsError::new(&e.to_string()))?;
+        let inspector = Inspector::new(&scene.scene, &camera, environment, &settings, pixel)
+            .map_err(refused)?;
         f(&inspector, &state)
     }
 
@@ -76,20 +76,19 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::inspect`].
-    pub(crate) fn axes(&self, json: &str) -> Result<Option<[Vec3; 3]>, JsError> {
+    pub(crate) fn axes(&self, json: &str) -> Result<Option<[Vec3; 3]>, Error> {
         let frame = self.inspected(json, |inspector, _| Ok(inspector.hemisphere(1)))?;
         Ok(frame.map(|maps| maps.frame.map(Vec3::from_array)))
     }
 }
 
-#[wasm_bindgen]
 impl Engine {
     /// Why a pixel is noisy under each of some strategies, and what would help: `{"x", "y", "width", "height", "camera",
     /// "seed", "strategies"}`.
     ///
     /// # Errors
     /// If scene or environment are missing, the pixel is outside, or a strategy is none or does not suit the environment.
-    pub fn inspect(&self, json: &str) -> Result<String, JsError> {
+    pub fn inspect(&self, json: &str) -> Result<String, Error> {
         let environment = self.environment()?.clone();
         self.inspected(json, |inspector, state| {
             let (mut found, mut samples): (Vec<Decomposition>, Vec<_>) = Default::default();
@@ -128,7 +127,7 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::inspect`].
-    pub fn hemisphere(&self, json: &str, resolution: usize) -> Result<Vec<f32>, JsError> {
+    pub fn hemisphere(&self, json: &str, resolution: usize) -> Result<Vec<f32>, Error> {
         self.inspected(json, |inspector, _| {
             let Some(maps) = inspector.hemisphere(resolution) else { return Ok(Vec::new()) };
             let visibility: Vec<Rgb> = maps.visibility.iter().map(|&v| Rgb::splat(v)).collect();
@@ -142,7 +141,7 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::inspect`].
-    pub fn directions(&self, json: &str, resolution: usize) -> Result<Vec<f32>, JsError> {
+    pub fn directions(&self, json: &str, resolution: usize) -> Result<Vec<f32>, Error> {
         let environment = self.environment()?.clone();
         self.inspected(json, |inspector, state| {
             let name = state.strategies.first().map_or("", String::as_str);

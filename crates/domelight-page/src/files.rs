@@ -13,6 +13,15 @@ impl Files {
         self.0.insert(PathBuf::from(path), bytes);
     }
 
+    /// Whether a file has exactly this path.
+    pub(crate) fn has(&self, path: &Path) -> bool {
+        self.0.contains_key(path)
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// The bytes of a file. One that is not where it is referred to is looked for by its name: who drops files drops
     /// no folders.
     pub(crate) fn get(&self, path: &Path) -> io::Result<&[u8]> {

@@ -4,10 +4,10 @@ use domelight::environment::{Environment, LatLongGrid};
 use domelight::math::vec2;
 use domelight::sampling::{Dimension, Sampler, SamplerKind, Table2d, TableError};
 use serde::Serialize;
-use wasm_bindgen::prelude::*;
 
-use crate::Engine;
+use crate::error::refused;
 use crate::setup::to_json;
+use crate::{Engine, Error};
 
 /// The probabilities of rows, and of the columns of one, for the page.
 #[derive(Serialize)]
@@ -44,23 +44,21 @@ fn table(width: usize, weights: &[f64]) -> Result<Table2d, TableError> {
     })
 }
 
-#[wasm_bindgen]
 impl Engine {
     /// The probabilities of the rows of the map in `width` columns and half as many rows, and of the columns of one row;
     /// rows count by their solid angle if `weighted`, and all alike otherwise.
     ///
     /// # Errors
     /// If there is no environment, it is black, or it has no such row.
-    #[wasm_bindgen(js_name = rowProbabilities)]
     pub fn row_probabilities(
         &self,
         width: usize,
         row: usize,
         weighted: bool,
-    ) -> Result<String, JsError> {
+    ) -> Result<String, Error> {
         let height = width / 2;
         if row >= height {
-            return Err(JsError::new("the map has no such row"));
+            return Err(refused("the map has no such row"));
         }
         let grid = LatLongGrid::new(width, height);
         let colors = self.map(width)?;
@@ -68,7 +66,7 @@ impl Engine {
         let texels = colors.as_chunks::<3>().0.iter().enumerate();
         let of_row = |y| if weighted { grid.solid_angle(y) } else { 1.0 };
         let weights: Vec<f64> = texels.map(|(i, &c)| luminance(c) * of_row(i / width)).collect();
-        let table = table(width, &weights).map_err(|e| JsError::new(&e.to_string()))?;
+        let table = table(width, &weights).map_err(refused)?;
         Ok(to_json(&RowReport {
             rows: (0..height).map(|y| table.rows().pmf(y)).collect(),
             columns: (0..width).map(|x| table.conditional_pmf(x, row)).collect(),
@@ -79,14 +77,13 @@ impl Engine {
     ///
     /// # Errors
     /// If there is no environment or it is black.
-    #[wasm_bindgen(js_name = mapSamples)]
-    pub fn map_samples(&self, n: u32, seed: u32) -> Result<String, JsError> {
+    pub fn map_samples(&self, n: usize, seed: u32) -> Result<String, Error> {
         let environment = self.environment()?;
         let [width, height] = [environment.map().width, environment.map().height];
         let mut weights = weights(environment);
-        let table = table(width, &weights).map_err(|e| JsError::new(&e.to_string()))?;
+        let table = table(width, &weights).map_err(refused)?;
         let sampler = Sampler::new(SamplerKind::Independent, seed.into(), 0);
-        let drawn: Vec<_> = (0..n)
+        let drawn: Vec<_> = (0..n as u32)
             .map(|i| {
                 let u = sampler.numbers(Dimension::Environment, i);
                 table.sample(vec2(u.0[0], u.0[1]))

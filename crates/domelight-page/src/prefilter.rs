@@ -10,10 +10,10 @@ use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings};
 use domelight::rig::{ExtractionSettings, extract};
 use domelight::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
-use wasm_bindgen::prelude::*;
 
+use crate::error::{error, refused};
 use crate::setup::{parse, to_json};
-use crate::{Engine, error};
+use crate::{Engine, Error};
 
 /// Columns of the table of the BRDF.
 const TABLE_SIZE: usize = 128;
@@ -89,17 +89,15 @@ struct TablesState {
 }
 
 impl IblState {
-    fn target(&self) -> Result<Option<Target>, JsError> {
+    fn target(&self) -> Result<Option<Target>, Error> {
         let named = (!self.engine.is_empty()).then(|| self.engine.parse());
-        named
-            .transpose()
-            .map_err(|e: domelight::rig::ibl::UnknownEngine| JsError::new(&e.to_string()))
+        named.transpose().map_err(refused)
     }
 
-    fn settings(&self) -> Result<IblSettings, JsError> {
+    fn settings(&self) -> Result<IblSettings, Error> {
         if self.size == 0 || self.size > IblSettings::MAX_SIZE {
             let text = format!("a cube's faces have 1 to {} columns", IblSettings::MAX_SIZE);
-            return Err(JsError::new(&text));
+            return Err(refused(text));
         }
         let linear = IblSettings::linear(self.size);
         let settings = match self.target()? {
@@ -117,18 +115,18 @@ impl IblState {
     fn treated<'a>(
         &self,
         environment: &'a Environment,
-    ) -> Result<(Cow<'a, Environment>, f64), JsError> {
+    ) -> Result<(Cow<'a, Environment>, f64), Error> {
         match self.sun {
             SunName::Keep => Ok((Cow::Borrowed(environment), 0.0)),
             SunName::Clamp if self.clamp > 0.0 => {
                 let (clamped, lost) = environment.clamped(self.clamp).map_err(error)?;
                 Ok((Cow::Owned(clamped), lost))
             }
-            SunName::Clamp => Err(JsError::new("radiance is clamped to a positive number")),
+            SunName::Clamp => Err(refused("radiance is clamped to a positive number")),
             SunName::Remove => {
                 let settings = ExtractionSettings { sun: true, ..ExtractionSettings::default() };
                 let extraction = extract(environment, settings).map_err(error)?;
-                let nothing = || JsError::new("all of the light is the sun; nothing is left");
+                let nothing = || refused("all of the light is the sun; nothing is left");
                 Ok((Cow::Owned(extraction.residual.ok_or_else(nothing)?), 0.0))
             }
         }
@@ -142,41 +140,42 @@ impl IblState {
     }
 }
 
-fn encoded(texture: &Texture, container: &str) -> Result<Vec<u8>, JsError> {
+fn encoded(texture: &Texture, container: &str) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     match container {
         "ktx2" => ktx2::encode(texture, &mut bytes),
         "dds" => dds::encode(texture, &mut bytes),
-        _ => return Err(JsError::new(&format!("there are no {container} files of textures"))),
+        _ => return Err(refused(format!("there are no {container} files of textures"))),
     }
-    .map_err(|e| JsError::new(&e.to_string()))?;
+    .map_err(refused)?;
     Ok(bytes)
 }
 
-#[wasm_bindgen]
 impl Engine {
     /// The engines, the languages of shaders and the usual number of texels of tables, as JSON.
-    pub fn targets(&self) -> String {
+    ///
+    /// # Errors
+    /// None.
+    pub fn targets(&self) -> Result<String, Error> {
         let language = |l: ShaderLanguage| Language { name: l.name(), extension: l.extension() };
-        to_json(&Offers {
+        Ok(to_json(&Offers {
             engines: Target::ALL.map(Target::name).into(),
             languages: ShaderLanguage::ALL.map(language).into(),
             texels: TableSettings::default().texels,
-        })
+        }))
     }
 
     /// Prefilters the map: `{"engine", "size", "texels", "sun", "clamp"}`; it is kept until the map changes.
     ///
     /// # Errors
     /// If there is no environment, it is black, or the settings are out of range.
-    pub fn prefilter(&mut self, json: &str) -> Result<String, JsError> {
+    pub fn prefilter(&mut self, json: &str) -> Result<String, Error> {
         if let Some((_, report, _)) = self.prefiltered.as_ref().filter(|(of, ..)| of == json) {
             return Ok(report.clone());
         }
         let state: IblState = parse(json)?;
         let (environment, clamped) = state.treated(self.environment()?)?;
-        let light = prefilter(&environment, &state.settings()?)
-            .map_err(|e| JsError::new(&e.to_string()))?;
+        let light = prefilter(&environment, &state.settings()?).map_err(refused)?;
         let (radiance, clipped) = Texture::cube(&light.levels, state.format());
         let (irradiance, _) =
             Texture::cube(std::slice::from_ref(&light.irradiance), state.format());
@@ -197,20 +196,18 @@ impl Engine {
     ///
     /// # Errors
     /// If something else was prefiltered, or there is no such file.
-    #[wasm_bindgen(js_name = iblFile)]
-    pub fn ibl_file(&self, json: &str, content: &str, container: &str) -> Result<Vec<u8>, JsError> {
+    pub fn ibl_file(&self, json: &str, content: &str, container: &str) -> Result<Vec<u8>, Error> {
         if content == "brdf" {
             let state: IblState = parse(json)?;
             let terms = state.target()?.map_or(TableTerms::ScaleAndBias, Target::table);
             return encoded(&Texture::table(&BrdfTable::new(TABLE_SIZE, terms)), container);
         }
         let kept = self.prefiltered.as_ref().filter(|(of, ..)| of == json);
-        let (_, _, textures) =
-            kept.ok_or_else(|| JsError::new("this light was not prefiltered"))?;
+        let (_, _, textures) = kept.ok_or_else(|| refused("this light was not prefiltered"))?;
         match content {
             "radiance" => encoded(&textures.radiance, container),
             "irradiance" => encoded(&textures.irradiance, container),
-            _ => Err(JsError::new(&format!("there is no texture {content}"))),
+            _ => Err(refused(format!("there is no texture {content}"))),
         }
     }
 
@@ -218,13 +215,10 @@ impl Engine {
     ///
     /// # Errors
     /// If there is no environment, nothing to sample, or no such format.
-    #[wasm_bindgen(js_name = tablesFile)]
-    pub fn tables_file(&self, json: &str, format: &str) -> Result<Vec<u8>, JsError> {
+    pub fn tables_file(&self, json: &str, format: &str) -> Result<Vec<u8>, Error> {
         let TablesState { texels, compensated } = parse(json)?;
         let settings = TableSettings { texels, compensated };
-        let failed = |e: String| JsError::new(&e);
-        let tables =
-            ShaderTables::new(self.environment()?, settings).map_err(|e| failed(e.to_string()))?;
+        let tables = ShaderTables::new(self.environment()?, settings).map_err(refused)?;
         match format {
             "bin" => Ok(tables.to_bytes()),
             "ktx2" => encoded(&Texture::shader_tables(&tables), "ktx2"),
@@ -234,9 +228,9 @@ impl Engine {
                 let alpha: Vec<f32> = texture.iter().map(|group| group[3]).collect();
                 let picture = RgbImage::new(width, texture.len() / width, pixels);
                 let layers = ExrLayers::from_image(&picture, Some(&alpha));
-                layers.encode().map_err(|e| failed(e.to_string()))
+                layers.encode().map_err(refused)
             }
-            _ => Err(failed(format!("there are no {format} files of tables"))),
+            _ => Err(refused(format!("there are no {format} files of tables"))),
         }
     }
 
@@ -244,9 +238,8 @@ impl Engine {
     ///
     /// # Errors
     /// If there is no such language.
-    pub fn snippet(&self, language: &str) -> Result<Vec<u8>, JsError> {
-        let unknown = |e: domelight::rig::tables::UnknownLanguage| JsError::new(&e.to_string());
-        let language: ShaderLanguage = language.parse().map_err(unknown)?;
+    pub fn snippet(&self, language: &str) -> Result<Vec<u8>, Error> {
+        let language: ShaderLanguage = language.parse().map_err(refused)?;
         Ok(language.snippet().as_bytes().to_vec())
     }
 }

@@ -1,0 +1,204 @@
+//! One engine of the page: answers calls in order, and renders between them, as a Worker does in the page alone.
+
+use std::collections::VecDeque;
+use std::net::TcpStream;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use domelight_page::{Engine, Host};
+use tungstenite::error::CapacityError;
+use tungstenite::protocol::CloseFrame;
+use tungstenite::protocol::frame::coding::CloseCode;
+use tungstenite::{Message, WebSocket};
+
+use super::message::{self, BadMessage, Incoming, Request};
+
+/// How long the picture is rendered before it is shown \[ms\].
+const SLICE: f64 = 40.0;
+
+/// How often files that have changed are noticed, while there is nothing to render.
+const PAUSE: Duration = Duration::from_millis(250);
+
+/// Why a connection ends.
+#[derive(Debug, thiserror::Error)]
+enum Ended {
+    #[error(transparent)]
+    Socket(#[from] tungstenite::Error),
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    #[error(transparent)]
+    Message(#[from] BadMessage),
+}
+
+/// A picture in progress.
+struct Rendering {
+    token: i64,
+    paused: bool,
+}
+
+struct Connection<'a> {
+    socket: WebSocket<TcpStream>,
+    engine: Engine,
+    rendering: Option<Rendering>,
+    pending: VecDeque<Incoming>,
+    /// Counts the changes of files.
+    revision: &'a AtomicU64,
+    seen: u64,
+}
+
+/// Serves one engine until the page is closed.
+pub(super) fn serve(socket: WebSocket<TcpStream>, host: Host, revision: &AtomicU64) {
+    let seen = revision.load(Ordering::Relaxed);
+    // Without it, changes of files would be noticed at the next message.
+    if socket.get_ref().set_read_timeout(Some(PAUSE)).is_err() {
+        return;
+    }
+    let (rendering, pending) = (None, VecDeque::new());
+    let engine = Engine::new(host);
+    let mut connection = Connection { socket, engine, rendering, pending, revision, seen };
+    let why = loop {
+        if let Err(why) = connection.turn() {
+            break why;
+        }
+    };
+    connection.close(&why);
+}
+
+impl Connection<'_> {
+    fn turn(&mut self) -> Result<(), Ended> {
+        self.receive()?;
+        let revision = self.revision.load(Ordering::Relaxed);
+        if revision != self.seen {
+            self.seen = revision;
+            self.send(message::changed())?;
+        }
+        match self.pending.pop_front() {
+            Some(incoming) => self.answer(&incoming),
+            None if self.is_rendering() => self.slice(),
+            None => Ok(()),
+        }
+    }
+
+    fn is_rendering(&self) -> bool {
+        self.rendering.as_ref().is_some_and(|rendering| !rendering.paused)
+    }
+
+    /// Takes the messages that are there; waits a moment for one if there is nothing else to do.
+    fn receive(&mut self) -> Result<(), Ended> {
+        let mut waits = self.pending.is_empty() && !self.is_rendering();
+        loop {
+            self.socket.get_mut().set_nonblocking(!waits)?;
+            let read = self.socket.read();
+            self.socket.get_mut().set_nonblocking(false)?;
+            match read {
+                Ok(Message::Binary(bytes)) => self.keep(Incoming::parse(&bytes)?),
+                Ok(Message::Text(_)) => return Err(BadMessage::Text.into()),
+                Ok(Message::Ping(_) | Message::Pong(_) | Message::Close(_) | Message::Frame(_)) => {
+                }
+                Err(tungstenite::Error::Io(error)) if is_pause(&error) => return Ok(()),
+                Err(error) => return Err(error.into()),
+            }
+            waits = false;
+        }
+    }
+
+    /// Keeps a request for its turn; a pause is for now.
+    fn keep(&mut self, incoming: Incoming) {
+        match (&incoming.request, &mut self.rendering) {
+            (&Request::Pause { token, paused }, Some(rendering)) if rendering.token == token => {
+                rendering.paused = paused;
+            }
+            (Request::Pause { .. }, _) => {}
+            _ => self.pending.push_back(incoming),
+        }
+    }
+
+    fn answer(&mut self, incoming: &Incoming) -> Result<(), Ended> {
+        match &incoming.request {
+            Request::Call { id, call, args } => {
+                let arguments = incoming.arguments(args)?;
+                let answered = self.engine.call(call, arguments);
+                // The render in progress was of an old scene or light.
+                if !self.engine.is_rendering() {
+                    self.rendering = None;
+                }
+                self.send(match answered {
+                    Ok(answer) => message::result(*id, &answer),
+                    Err(error) => message::error(*id, &error.to_string()),
+                })
+            }
+            Request::Render { token, settings } => {
+                let is_render = |other: &Incoming| matches!(other.request, Request::Render { .. });
+                if self.pending.iter().any(is_render) {
+                    return Ok(());
+                }
+                self.rendering = None;
+                let message = match self.engine.start(settings) {
+                    Ok(strategy) => {
+                        self.rendering = Some(Rendering { token: *token, paused: false });
+                        message::started(*token, &strategy)
+                    }
+                    Err(error) => message::failed(*token, &error.to_string()),
+                };
+                self.send(message)
+            }
+            Request::Budget { token, rays } => match &mut self.rendering {
+                Some(rendering) if rendering.token == *token => {
+                    rendering.paused = false;
+                    self.engine.set_budget(*rays);
+                    Ok(())
+                }
+                _ => self.send(message::spent(*token)),
+            },
+            Request::Stop {} => {
+                self.rendering = None;
+                Ok(())
+            }
+            Request::Pause { .. } => Ok(()),
+        }
+    }
+
+    /// Renders a little, and shows it.
+    fn slice(&mut self) -> Result<(), Ended> {
+        let Some(Rendering { token, .. }) = self.rendering else { return Ok(()) };
+        let update = match self.engine.step(SLICE) {
+            Ok(update) => update,
+            Err(error) => {
+                self.rendering = None;
+                return self.send(message::failed(token, &error.to_string()));
+            }
+        };
+        if update.complete {
+            self.rendering = None;
+        } else if let Some(rendering) = &mut self.rendering {
+            rendering.paused = update.spent;
+        }
+        if update.complete || !update.spent {
+            self.send(message::update(token, &update))?;
+        }
+        if update.spent { self.send(message::spent(token)) } else { Ok(()) }
+    }
+
+    fn send(&mut self, message: Vec<u8>) -> Result<(), Ended> {
+        Ok(self.socket.send(Message::Binary(message.into()))?)
+    }
+
+    /// Says why it ends, to who still listens.
+    fn close(&mut self, why: &Ended) {
+        let code = match why {
+            Ended::Message(_) => CloseCode::Unsupported,
+            Ended::Socket(tungstenite::Error::Capacity(CapacityError::MessageTooLong {
+                ..
+            })) => CloseCode::Size,
+            Ended::Socket(_) | Ended::Io(_) => CloseCode::Protocol,
+        };
+        let reason = why.to_string().into();
+        let _ = self.socket.close(Some(CloseFrame { code, reason }));
+        let _ = self.socket.flush();
+    }
+}
+
+/// Whether nothing has come yet.
+fn is_pause(error: &std::io::Error) -> bool {
+    matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut)
+}
