@@ -1,4 +1,9 @@
-"""Writes the notices of all crates that the wheel contains: name, version, license, and each license text once."""
+"""Writes the notices of all crates that the wheel contains: name, version, license, and each license text once.
+
+    notices.py FILE [MANIFEST CRATE]
+
+With a manifest, those of a crate of its own.
+"""
 
 import json
 import pathlib
@@ -51,6 +56,10 @@ def text(roots: list[tuple[pathlib.Path, str]]) -> str:
 
 
 def main() -> None:
+    if len(sys.argv) > 2:
+        manifest, root = sys.argv[2:]
+        pathlib.Path(sys.argv[1]).write_text(text([(pathlib.Path(manifest), root)]), encoding="utf-8")
+        return
     roots = [(FOLDER / "Cargo.toml", "domelight-python")]
     program = FOLDER / "../../Cargo.toml"
     # A source distribution has no program.

@@ -1,20 +1,25 @@
-//! `bindgen MODULE FOLDER`: writes `engine.js`, `engine.d.ts` and `engine_bg.wasm`, what the command wasm-bindgen does
-//! for pages, without the web servers and drivers that it is built with.
+//! `bindgen MODULE FOLDER [--no-names]`: writes `engine.js`, `engine.d.ts` and `engine_bg.wasm`, what the command wasm-bindgen does
+//! for pages, without the web servers and drivers that it is built with. The names of functions are 5 % of a module.
 use std::process::ExitCode;
 
 use wasm_bindgen_cli_support::Bindgen;
 
 fn main() -> ExitCode {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();
-    let [module, folder] = &arguments[..] else {
-        eprintln!("usage: bindgen MODULE FOLDER");
-        return ExitCode::from(2);
+    let (module, folder, has_names) = match &arguments[..] {
+        [module, folder] => (module, folder, true),
+        [module, folder, option] if option == "--no-names" => (module, folder, false),
+        _ => {
+            eprintln!("usage: bindgen MODULE FOLDER [--no-names]");
+            return ExitCode::from(2);
+        }
     };
     let mut bindgen = Bindgen::new();
     let written = bindgen
         .input_path(module)
         .out_name("engine")
         .typescript(true)
+        .remove_name_section(!has_names)
         .web(true)
         .and_then(|b| b.generate(folder));
     match written {

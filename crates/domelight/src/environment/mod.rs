@@ -147,6 +147,19 @@ pub enum EnvironmentError {
     BadRotation(f32),
 }
 
+/// The factor on a map's radiance that a scale and an exposure in stops make: scale · 2^exposure.
+///
+/// # Errors
+/// [`EnvironmentError::BadExposure`] for an exposure that makes a factor of 0 or ∞ of a scale that is neither.
+pub fn radiance_factor(scale: f32, exposure: f32) -> Result<f32, EnvironmentError> {
+    let factor = scale * functions::exp2(exposure);
+    let is_lost = !factor.is_finite() || factor == 0.0;
+    if is_lost && scale.is_finite() && scale != 0.0 {
+        return Err(EnvironmentError::BadExposure { exposure, factor });
+    }
+    Ok(factor)
+}
+
 /// A direction sampled from the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvironmentSample {

@@ -173,6 +173,32 @@ pub enum Region {
     Lamp,
 }
 
+impl Region {
+    /// `sun`, `lamp` or `region`: a word for files.
+    pub const fn kind(self) -> &'static str {
+        match self {
+            Self::Sun => "sun",
+            Self::Lamp => "lamp",
+            Self::Rectangle(_) | Self::Cell => "region",
+        }
+    }
+}
+
+/// A unique name for each light: `sun`, `lamp_1`, …, `light_1`, ….
+pub fn light_names(lights: &[RigLight]) -> Vec<String> {
+    let (mut lamps, mut regions) = (0, 0);
+    let numbered = |name: &str, count: &mut usize| {
+        *count += 1;
+        format!("{name}_{count}")
+    };
+    let name = |light: &RigLight| match light.region {
+        Region::Sun => "sun".to_owned(),
+        Region::Lamp => numbered("lamp", &mut lamps),
+        Region::Rectangle(_) | Region::Cell => numbered("light", &mut regions),
+    };
+    lights.iter().map(name).collect()
+}
+
 /// Columns [x0, x1) and rows [y0, y1) of the map.
 ///
 /// Columns continue across the seam: 0 ≤ x0 < width, x1 ≤ x0 + width, and column x ≥ width is column

@@ -11,9 +11,9 @@ use super::material::Material;
 use super::offset;
 use super::texture::Texture;
 use crate::RgbImage;
-use crate::environment::{Environment, EnvironmentError, Orientation, UpAxis};
+use crate::environment::{Environment, EnvironmentError, Orientation, UpAxis, radiance_factor};
 use crate::geometry::{Aabb, Mesh, conjugated};
-use crate::math::{DVec3, Mat4, functions};
+use crate::math::{DVec3, Mat4};
 use crate::strategy::Portal;
 
 /// The description of a scene, from a loader or a built-in scene. [`Scene::new`](super::Scene::new) checks it.
@@ -108,13 +108,7 @@ impl EnvironmentSettings {
     /// # Errors
     /// An exposure that makes a factor of 0 or ∞ of a scale that is neither.
     pub fn factor(&self) -> Result<f32, EnvironmentError> {
-        let Self { scale, exposure, .. } = *self;
-        let factor = scale * functions::exp2(exposure);
-        let is_lost = !factor.is_finite() || factor == 0.0;
-        if is_lost && scale.is_finite() && scale != 0.0 {
-            return Err(EnvironmentError::BadExposure { exposure, factor });
-        }
-        Ok(factor)
+        radiance_factor(self.scale, self.exposure)
     }
 
     /// How the map stands in the world.

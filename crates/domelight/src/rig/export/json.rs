@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::RigExport;
 use crate::environment::UpAxis;
-use crate::rig::{Region, RigLight};
+use crate::rig::RigLight;
 
 /// The version of the format; it grows when a reader of an older version would be wrong.
 pub const VERSION: u32 = 1;
@@ -69,11 +69,7 @@ impl Light {
     fn new(light: &RigLight, name: String) -> Self {
         Self {
             name,
-            kind: match light.region {
-                Region::Sun => "sun",
-                Region::Lamp => "lamp",
-                Region::Rectangle(_) | Region::Cell => "region",
-            },
+            kind: light.region.kind(),
             direction: light.direction.to_array(),
             irradiance: light.irradiance.to_array(),
             angular_radius: light.angular_radius,

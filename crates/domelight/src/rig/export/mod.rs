@@ -29,7 +29,7 @@ pub use json::VERSION as JSON_VERSION;
 
 use std::str::FromStr;
 
-use super::{Region, RigLight, SphericalHarmonics};
+use super::{RigLight, SphericalHarmonics, light_names};
 use crate::environment::mapping::Mapping;
 use crate::environment::{Environment, Orientation};
 
@@ -63,19 +63,9 @@ impl RigExport<'_> {
         self.dome.and_then(|dome| dome.file)
     }
 
-    /// A unique name for each light: `sun`, `lamp_1`, …, `light_1`, ….
+    /// A unique name for each light: [`light_names`].
     pub fn names(&self) -> Vec<String> {
-        let (mut lamps, mut regions) = (0, 0);
-        let numbered = |name: &str, count: &mut usize| {
-            *count += 1;
-            format!("{name}_{count}")
-        };
-        let name = |light: &RigLight| match light.region {
-            Region::Sun => "sun".to_owned(),
-            Region::Lamp => numbered("lamp", &mut lamps),
-            Region::Rectangle(_) | Region::Cell => numbered("light", &mut regions),
-        };
-        self.lights.iter().map(name).collect()
+        light_names(self.lights)
     }
 }
 
@@ -347,6 +337,7 @@ impl FromStr for Format {
 mod tests_support {
     use super::*;
     use crate::math::{Vec3, vec3};
+    use crate::rig::Region;
     use crate::{Rgb, RgbImage};
 
     /// A light that is small.

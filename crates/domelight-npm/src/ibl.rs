@@ -1,0 +1,211 @@
+//! Prefiltered light as files of textures.
+
+use domelight::Rgb;
+use domelight::picture::texture::{ClippedLight, Container, TexelFormat, Texture};
+use domelight::rig::RigError;
+use domelight::rig::ibl::{
+    BrdfTable, Engine, IblSettings, PrefilteredLight, SunError, SunTreatment, TreatedEnvironment,
+    UnknownEngine, UnknownSunTreatment, prefilter,
+};
+use serde::{Deserialize, Serialize};
+use wasm_bindgen::prelude::*;
+
+use crate::map::LightMap;
+use crate::options::{parse, to_json};
+
+/// The options of prefiltered light, as those of `domelight ibl`.
+#[derive(Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct IblOptions {
+    size: usize,
+    #[serde(rename = "for")]
+    engine: Option<String>,
+    sun: String,
+    texels: Texels,
+    container: ContainerName,
+}
+
+impl Default for IblOptions {
+    fn default() -> Self {
+        Self {
+            size: 256,
+            engine: None,
+            sun: "keep".to_owned(),
+            texels: Texels::Rgb9e5,
+            container: ContainerName::Ktx2,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Texels {
+    Rgb9e5,
+    Half,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum ContainerName {
+    Ktx2,
+    Dds,
+}
+
+/// Files of prefiltered light.
+#[wasm_bindgen]
+pub struct Prefiltered {
+    radiance: Vec<u8>,
+    irradiance: Vec<u8>,
+    brdf: Vec<u8>,
+    report: String,
+}
+
+/// What prefiltered light is, for JavaScript.
+#[derive(Serialize)]
+struct Report {
+    levels: Vec<Level>,
+    harmonics: [[f32; 3]; 9],
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Level {
+    size: usize,
+    roughness: f32,
+}
+
+impl IblOptions {
+    fn engine(&self) -> Result<Option<Engine>, JsError> {
+        let unknown = |e: UnknownEngine| JsError::new(&format!("ibl: option for: {e}"));
+        self.engine.as_deref().map(str::parse).transpose().map_err(unknown)
+    }
+
+    fn sun(&self) -> Result<SunTreatment, JsError> {
+        let unknown = |e: UnknownSunTreatment| JsError::new(&format!("ibl: option sun: {e}"));
+        self.sun.parse().map_err(unknown)
+    }
+
+    fn settings(&self, engine: Option<Engine>) -> Result<IblSettings, JsError> {
+        if !(1..=IblSettings::MAX_SIZE).contains(&self.size) {
+            let (size, most) = (self.size, IblSettings::MAX_SIZE);
+            return Err(JsError::new(&format!("ibl: option size: {size} is not in [1, {most}]")));
+        }
+        Ok(IblSettings::for_engine(engine, self.size))
+    }
+
+    fn format(&self) -> TexelFormat {
+        match self.texels {
+            Texels::Rgb9e5 => TexelFormat::SharedExponent,
+            Texels::Half => TexelFormat::Half,
+        }
+    }
+
+    fn encode(&self, texture: &Texture) -> Result<Vec<u8>, JsError> {
+        let container = match self.container {
+            ContainerName::Ktx2 => Container::Ktx2,
+            ContainerName::Dds => Container::Dds,
+        };
+        let mut bytes = Vec::new();
+        container.encode(texture, &mut bytes).map_err(|e| JsError::new(&e.to_string()))?;
+        Ok(bytes)
+    }
+}
+
+/// The light with its sun treated, and what there is to say of it.
+fn treated(
+    map: &LightMap,
+    sun: SunTreatment,
+) -> Result<(TreatedEnvironment<'_>, Option<String>), JsError> {
+    let LightMap { environment, name, .. } = map;
+    let failed = |e: SunError| JsError::new(&format!("{name}: {e}"));
+    match sun.apply(environment) {
+        Err(SunError::Extraction(e @ RigError::NoSun { .. })) => {
+            let kept = SunTreatment::Keep.apply(environment).map_err(failed)?;
+            Ok((kept, Some(format!("{name}: {e}; nothing is removed"))))
+        }
+        applied => {
+            let treated = applied.map_err(failed)?;
+            let percent = 100.0 * treated.clamped;
+            let warning =
+                (percent > 0.0).then(|| format!("{name}: clamped, -{percent:.2} % light"));
+            Ok((treated, warning))
+        }
+    }
+}
+
+#[wasm_bindgen]
+impl LightMap {
+    /// Prefilters the map.
+    ///
+    /// # Errors
+    /// If it is black, or an option is wrong.
+    pub fn ibl(&self, options: &str) -> Result<Prefiltered, JsError> {
+        let options: IblOptions = parse("ibl", options)?;
+        let engine = options.engine()?;
+        let settings = options.settings(engine)?;
+        let (treated, warning) = treated(self, options.sun()?)?;
+        let light =
+            prefilter(&treated.environment, &settings).map_err(|e| JsError::new(&e.to_string()))?;
+        let (radiance, clipped) = Texture::cube(&light.levels, options.format());
+        let (irradiance, _) =
+            Texture::cube(std::slice::from_ref(&light.irradiance), options.format());
+        let brdf = Texture::table(&BrdfTable::new(BrdfTable::SIZE, Engine::terms(engine)));
+        Ok(Prefiltered {
+            radiance: options.encode(&radiance)?,
+            irradiance: options.encode(&irradiance)?,
+            brdf: options.encode(&brdf)?,
+            report: to_json(&Report {
+                levels: levels(&light, &settings),
+                harmonics: light.harmonics.coefficients.map(Rgb::to_array),
+                warnings: warning
+                    .into_iter()
+                    .chain(self.clipped(clipped, options.format()))
+                    .collect(),
+            }),
+        })
+    }
+
+    /// A warning of texels that the format cannot hold.
+    fn clipped(&self, clipped: ClippedLight, format: TexelFormat) -> Option<String> {
+        let (name, largest) = (&self.name, format.largest());
+        let percent = 100.0 * clipped.lost;
+        (clipped.texels > 0).then(|| {
+            format!(
+                "{name}: {} texels are brighter than {largest}, the most that the format holds, and are clipped: level 0 \
+                 loses {percent:.2} % of its light; rougher levels are filtered before that",
+                clipped.texels
+            )
+        })
+    }
+}
+
+fn levels(light: &PrefilteredLight, settings: &IblSettings) -> Vec<Level> {
+    let levels = light.levels.iter().zip(&settings.roughness);
+    levels.map(|(cube, &roughness)| Level { size: cube.size, roughness }).collect()
+}
+
+#[wasm_bindgen]
+impl Prefiltered {
+    /// The file of the cube of radiance, once.
+    #[wasm_bindgen(js_name = takeRadiance)]
+    pub fn take_radiance(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.radiance)
+    }
+
+    /// The file of the cube of irradiance over π, once.
+    #[wasm_bindgen(js_name = takeIrradiance)]
+    pub fn take_irradiance(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.irradiance)
+    }
+
+    /// The file of the table of the BRDF, once.
+    #[wasm_bindgen(js_name = takeBrdf)]
+    pub fn take_brdf(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.brdf)
+    }
+
+    /// What the files hold, as JSON.
+    pub fn report(&self) -> String {
+        self.report.clone()
+    }
+}
