@@ -1,25 +1,15 @@
 //! Light for engines and shaders: prefiltered cubes, tables, and the code that samples them.
 
-use std::borrow::Cow;
-
-use domelight::environment::Environment;
 use domelight::picture::exr::ExrLayers;
-use domelight::picture::texture::{TexelFormat, Texture, dds, ktx2};
-use domelight::rig::ibl::{BrdfTable, Engine as Target, IblSettings, TableTerms, prefilter};
+use domelight::picture::texture::{Container, TexelFormat, Texture};
+use domelight::rig::ibl::{BrdfTable, Engine as Target, IblSettings, SunTreatment, prefilter};
 use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings};
-use domelight::rig::{ExtractionSettings, extract};
 use domelight::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
-use crate::error::{error, refused};
+use crate::error::refused;
 use crate::setup::{parse, to_json};
 use crate::{Engine, Error};
-
-/// Columns of the table of the BRDF.
-const TABLE_SIZE: usize = 128;
-
-/// Columns of a face of the irradiance cube.
-const IRRADIANCE_SIZE: usize = 32;
 
 /// The settings of prefiltered light, as those of `domelight ibl`.
 #[derive(Deserialize)]
@@ -94,41 +84,11 @@ impl IblState {
         named.transpose().map_err(refused)
     }
 
-    fn settings(&self) -> Result<IblSettings, Error> {
-        if self.size == 0 || self.size > IblSettings::MAX_SIZE {
-            let text = format!("a cube's faces have 1 to {} columns", IblSettings::MAX_SIZE);
-            return Err(refused(text));
-        }
-        let linear = IblSettings::linear(self.size);
-        let settings = match self.target()? {
-            None => linear,
-            Some(engine) => IblSettings {
-                roughness: engine.roughness(self.size),
-                axes: engine.axes(),
-                ..linear
-            },
-        };
-        Ok(IblSettings { irradiance_size: IRRADIANCE_SIZE.min(settings.size), ..settings })
-    }
-
-    /// The environment with its sun treated, and the share of the light that was clamped.
-    fn treated<'a>(
-        &self,
-        environment: &'a Environment,
-    ) -> Result<(Cow<'a, Environment>, f64), Error> {
+    fn treatment(&self) -> SunTreatment {
         match self.sun {
-            SunName::Keep => Ok((Cow::Borrowed(environment), 0.0)),
-            SunName::Clamp if self.clamp > 0.0 => {
-                let (clamped, lost) = environment.clamped(self.clamp).map_err(error)?;
-                Ok((Cow::Owned(clamped), lost))
-            }
-            SunName::Clamp => Err(refused("radiance is clamped to a positive number")),
-            SunName::Remove => {
-                let settings = ExtractionSettings { sun: true, ..ExtractionSettings::default() };
-                let extraction = extract(environment, settings).map_err(error)?;
-                let nothing = || refused("all of the light is the sun; nothing is left");
-                Ok((Cow::Owned(extraction.residual.ok_or_else(nothing)?), 0.0))
-            }
+            SunName::Keep => SunTreatment::Keep,
+            SunName::Remove => SunTreatment::Remove,
+            SunName::Clamp => SunTreatment::Clamp(self.clamp),
         }
     }
 
@@ -141,13 +101,10 @@ impl IblState {
 }
 
 fn encoded(texture: &Texture, container: &str) -> Result<Vec<u8>, Error> {
+    let unknown = || refused(format!("there are no {container} files of textures"));
     let mut bytes = Vec::new();
-    match container {
-        "ktx2" => ktx2::encode(texture, &mut bytes),
-        "dds" => dds::encode(texture, &mut bytes),
-        _ => return Err(refused(format!("there are no {container} files of textures"))),
-    }
-    .map_err(refused)?;
+    let container = Container::of_extension(container).ok_or_else(unknown)?;
+    container.encode(texture, &mut bytes).map_err(refused)?;
     Ok(bytes)
 }
 
@@ -174,8 +131,9 @@ impl Engine {
             return Ok(report.clone());
         }
         let state: IblState = parse(json)?;
-        let (environment, clamped) = state.treated(self.environment()?)?;
-        let light = prefilter(&environment, &state.settings()?).map_err(refused)?;
+        let treated = state.treatment().apply(self.environment()?).map_err(refused)?;
+        let settings = IblSettings::for_engine(state.target()?, state.size);
+        let light = prefilter(&treated.environment, &settings).map_err(refused)?;
         let (radiance, clipped) = Texture::cube(&light.levels, state.format());
         let (irradiance, _) =
             Texture::cube(std::slice::from_ref(&light.irradiance), state.format());
@@ -183,7 +141,7 @@ impl Engine {
             levels: light.levels.len(),
             clipped: clipped.texels,
             lost: clipped.lost,
-            clamped,
+            clamped: treated.clamped,
         };
         let report = to_json(&report);
         let textures = Textures { radiance, irradiance };
@@ -199,8 +157,8 @@ impl Engine {
     pub fn ibl_file(&self, json: &str, content: &str, container: &str) -> Result<Vec<u8>, Error> {
         if content == "brdf" {
             let state: IblState = parse(json)?;
-            let terms = state.target()?.map_or(TableTerms::ScaleAndBias, Target::table);
-            return encoded(&Texture::table(&BrdfTable::new(TABLE_SIZE, terms)), container);
+            let table = BrdfTable::new(BrdfTable::SIZE, Target::terms(state.target()?));
+            return encoded(&Texture::table(&table), container);
         }
         let kept = self.prefiltered.as_ref().filter(|(of, ..)| of == json);
         let (_, _, textures) = kept.ok_or_else(|| refused("this light was not prefiltered"))?;

@@ -33,8 +33,8 @@ fn environments() -> Vec<(String, Environment)> {
     let of = |map: RgbImage| Environment::new(map, Orientation::default(), 1.0).expect("a map");
     if let Ok(paths) = std::env::var("DOMELIGHT_PROBES") {
         let load = |path: &str| {
-            let probe = load_probe(Path::new(path), ProbeOptions::default()).expect(path);
-            (path.to_owned(), of(probe.map))
+            let probe = load_probe(Path::new(path), &ProbeOptions::default()).expect(path);
+            (path.to_owned(), of(probe.image))
         };
         return paths.split(':').map(load).collect();
     }
@@ -194,7 +194,9 @@ fn print_errors(name: &str, env: &Environment) {
     let sampled = FilteredSampling::new(&levels[0]).prefilter();
     println!("{name}: errors relative to the mean of the level [%], root mean square (largest)");
     print!("{:>28}", "roughness");
-    settings().roughness[1..].iter().for_each(|r| print!("{r:>18.1}"));
+    for roughness in &settings().roughness[1..] {
+        print!("{roughness:>18.1}");
+    }
     println!();
     for (method, levels) in [("domelight ibl", &levels), ("1024 filtered samples", &sampled)] {
         print!("{method:>28}");
@@ -207,7 +209,9 @@ fn print_errors(name: &str, env: &Environment) {
 
 fn benches(criterion: &mut Criterion) {
     let all = environments();
-    all.iter().for_each(|(name, env)| print_errors(name, env));
+    for (name, env) in &all {
+        print_errors(name, env);
+    }
     let (name, env) = &all[all.len() - 1];
     let mut group = criterion.benchmark_group(format!("{name}, {SIZE} columns"));
     group.sample_size(10);
