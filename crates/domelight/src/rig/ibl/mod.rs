@@ -70,9 +70,12 @@ impl IblSettings {
     /// [`IblSettings::linear`].
     pub fn for_engine(engine: Option<Engine>, size: usize) -> Self {
         let linear = Self::linear(size);
-        let of = |engine: Engine| (engine.roughness(size), engine.axes());
-        let (roughness, axes) = engine.map_or((linear.roughness, linear.axes), of);
-        Self { roughness, axes, ..Self::linear(size) }
+        match engine {
+            None => linear,
+            Some(engine) => {
+                Self { roughness: engine.roughness(size), axes: engine.axes(), ..linear }
+            }
+        }
     }
 }
 
