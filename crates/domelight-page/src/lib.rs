@@ -33,6 +33,7 @@ pub use map::MapView;
 use prefilter::Textures;
 use session::Rendering;
 pub use session::{Statistics, Update};
+pub use setup::CameraState;
 use setup::{Light, LoadedLight, LoadedScene};
 
 /// Scene, light and camera, and what is rendered of them.

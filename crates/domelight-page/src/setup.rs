@@ -81,7 +81,7 @@ pub(crate) struct LoadedScene {
 /// A camera in JSON; one of `fov` and `ortho` is null.
 #[derive(Clone, Copy, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct CameraState {
+pub struct CameraState {
     origin: [f32; 3],
     target: [f32; 3],
     up: [f32; 3],
@@ -90,7 +90,8 @@ pub(crate) struct CameraState {
 }
 
 impl CameraState {
-    fn new(settings: &CameraSettings) -> Self {
+    /// What the page knows of a camera.
+    pub fn new(settings: &CameraSettings) -> Self {
         let (fov, ortho) = match settings.projection {
             Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),
             Projection::Orthographic { height } => (None, Some(height)),

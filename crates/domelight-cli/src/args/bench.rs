@@ -25,7 +25,7 @@ Examples:
       cases of your choice
   domelight bench --suite probes --strategies product,mis --vs mitsuba --python venv/bin/python
       the same pictures rendered by Mitsuba 3, in turns
-  domelight bench --suite felt --program domelight ./domelight-0.1
+  domelight bench --suite felt --program ./domelight ./domelight-0.1
       what people wait for, by two versions in turns
   domelight bench --suite rigs -o rigs.json && domelight bench --table rigs.json
       results as a file, and its tables as Markdown";

@@ -14,7 +14,7 @@ Examples:
   domelight view scene.toml --strategy mis:3:1 --spp 64 --watch
       the same for a scene file, loaded again whenever it or its map changes
   domelight view render.exr
-      what a picture shows, as it was rendered
+      the scene of a picture, with the options that rendered it
   domelight view --no-open --port 8080
       only the address, to open in a browser by hand";
 
@@ -34,10 +34,10 @@ pub(crate) struct ViewArguments {
     /// Only print the address of the page
     #[arg(long, help_heading = "Page")]
     pub(crate) no_open: bool,
-    /// Port of this computer at which the page is [default: any that is free]
+    /// Port to serve the page on [default: any free one]
     #[arg(long, value_name = "N", help_heading = "Page", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) port: Option<u16>,
-    /// The page as it was built [default: domelight.html beside the program, or in share/domelight]
+    /// Page to serve [default: domelight.html beside the program, or in share/domelight]
     #[arg(long, value_name = "FILE", help_heading = "Page")]
     pub(crate) page: Option<PathBuf>,
 }

@@ -8,10 +8,11 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::picture::exposure::Exposure;
 use domelight::render::Passes;
 use domelight::scene::builtin::BuiltinScene;
-use domelight::scene::{CameraSettings, EnvironmentSettings, Projection, SceneDescription};
+use domelight::scene::{EnvironmentSettings, SceneDescription};
 use domelight_lab::job::value::{Choice, Rotation, Seed, Size, Text};
 use domelight_lab::job::{Job, View, probe_name};
 use domelight_lab::{Ground, Host};
+use domelight_page::CameraState;
 use serde::Serialize;
 
 use crate::error::UsageError;
@@ -22,28 +23,6 @@ const MAX_SPP: u32 = 1 << 16;
 const MAX_ROWS: u32 = 4096;
 /// The largest whole number that JavaScript has.
 const MAX_SEED: u64 = (1 << 53) - 1;
-
-/// A camera as the page writes it.
-#[derive(Serialize)]
-struct Camera {
-    origin: [f32; 3],
-    target: [f32; 3],
-    up: [f32; 3],
-    fov: Option<f32>,
-    ortho: Option<f32>,
-}
-
-impl Camera {
-    fn new(settings: &CameraSettings) -> Self {
-        let (fov, ortho) = match settings.projection {
-            Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),
-            Projection::Orthographic { height } => (None, Some(height)),
-        };
-        let [origin, target, up] =
-            [settings.origin, settings.target, settings.up].map(|v| v.to_array());
-        Self { origin, target, up, fov, ortho }
-    }
-}
 
 /// What follows `#` in the address of the page that shows a job. Scene and map are read if the camera or the light depend on
 /// them.
@@ -64,7 +43,7 @@ pub(super) fn fragment(job: &Job, host: &dyn Host) -> Result<String> {
     let settings = if asks_for_view || is_auto || needs_scene {
         let loaded = job.scene_settings().load(host)?;
         if asks_for_view {
-            state.json("camera", &Camera::new(&loaded.camera));
+            state.json("camera", &CameraState::new(&loaded.camera));
         }
         Some(loaded.light)
     } else if builtin.is_some() || light.map.is_some() {
