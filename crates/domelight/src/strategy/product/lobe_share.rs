@@ -1,19 +1,21 @@
 //! What strata leave to BRDF samples: the light that narrow lobes reflect from wide cells.
 //!
 //! A table knows a lobe that is narrower than a cell only as a mean over the cell, and the pool has few directions there,
-//! the same for all pixels. BRDF samples follow the lobe, but not the light. In a cell with radiance L, the variances of
-//! M strata and of as many BRDF samples are about
+//! the same for all pixels. BRDF samples follow the lobe, but not the light. If strata have the part s of the light of a cell
+//! with radiance L and BRDF samples the rest, the variances of M samples of each are about
 //!
 //! ```text
-//! strata   L F T v/M            v = (r/α)², the part of the variance that is left in a cell of angular radius r
-//! BRDF     L̂ L F A/M            F = ∫ f dω over the cell      A = ∫ f dω      T = Σ L F      L̂ = ∫ L² dω/∫ L dω
+//! strata   Σ s² L F T v/M                          v = (r/α)², the part of the variance left in a cell of angular radius r
+//! BRDF     (Σ (1 − s)² L̂ L F A − B²)/M             B = Σ (1 − s) L F, what BRDF samples have of the light
+//!          F = ∫ f dω over the cell      A = ∫ f dω      T = Σ L F      L̂ = ∫ L² dω/∫ L dω
 //! ```
 //!
-//! for a lobe of roughness α. So the density of strata, which the balance heuristic compares with that of BRDF samples, is
-//! multiplied by s = 1/(1 + v T/(A L̂)), the part of strata in weights by inverse variance, and the number of BRDF samples
-//! follows the light that strata leave. Light that scouts have not seen counts less: L is multiplied by its factor beside
-//! that of the cell that is seen best. This is MIS compensation (Karlík et al. 2019, "MIS Compensation: Optimizing Sampling
-//! Techniques in Multiple Importance Sampling") with s in place of a constant radiance to subtract.
+//! for a lobe of roughness α. Their sum is smallest for s = (A L̂ − B)/(A L̂ + T v), where that is positive: BRDF samples alone
+//! have no variance where the light is even. The density of strata, which the balance heuristic compares with that of BRDF
+//! samples, is multiplied by s, and the number of BRDF samples follows the light that strata leave. Light that scouts have
+//! not seen counts less: L is multiplied by its factor beside that of the cell that is seen best. This is MIS compensation
+//! (Karlík et al. 2019, "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling"), whose constant
+//! B/A follows from the division.
 
 use super::cells::{CellArray, Cells};
 use super::control_variate::ControlVariate;
@@ -31,6 +33,9 @@ const WIDE: f32 = 0.15;
 
 /// Narrower lobes count as having this roughness.
 const LEAST_WIDTH: f32 = 1e-3;
+
+/// B and s depend on each other; after this many rounds, more change the error by less than a twentieth.
+const ROUNDS: usize = 4;
 
 /// The factor of the cell that is seen best is at least this.
 const LEAST_SEEN: f32 = 1e-3;
@@ -72,18 +77,28 @@ impl LobeShare {
         }
         let albedo = groups.albedo().max(f32::MIN_POSITIVE);
         let most_seen = most_seen.store().as_flattened().iter().copied().fold(LEAST_SEEN, f32::max);
-        let light = of_lobes.sum() / (albedo * sqr(width.max(LEAST_WIDTH)));
-        let scale = one(light / sqr(most_seen));
+        let most_seen = sqr(most_seen);
+        let scale = one(of_lobes.sum() / (albedo * sqr(width.max(LEAST_WIDTH)) * most_seen));
+        // B/A, at first for strata alone.
+        let mut even = 0.0;
         let mut left = one(0.0);
-        for pair in cells.pairs() {
-            let [lobes, all] = table.reflectance(simd, pair, diffuse);
-            let seen = seen.pair(simd, pair);
-            let of_lobes = lobes / all.max(one(f32::MIN_POSITIVE));
-            let variance = cells.radius.pair(simd, pair).squared() * of_lobes;
-            let dimness = cells.inverse_brightness.pair(simd, pair) * seen;
-            let of_strata = one(1.0) / (one(1.0) + scale * variance * dimness);
-            self.of_strata.set_pair(pair, of_strata);
-            left = left + (one(1.0) - of_strata) * all * cells.mass.pair(simd, pair) * seen;
+        for _ in 0..ROUNDS {
+            let mut left_of_lobes = one(0.0);
+            left = one(0.0);
+            for pair in cells.pairs() {
+                let [lobes, all] = table.reflectance(simd, pair, diffuse);
+                let seen = seen.pair(simd, pair);
+                let of_lobes = lobes / all.max(one(f32::MIN_POSITIVE));
+                let variance = cells.radius.pair(simd, pair).squared() * of_lobes;
+                let dimness = cells.inverse_brightness.pair(simd, pair) * seen;
+                let above = (one(1.0) - one(even) * dimness).max(one(0.0));
+                let of_strata = above / (one(1.0) + scale * variance * dimness);
+                self.of_strata.set_pair(pair, of_strata);
+                let light = (one(1.0) - of_strata) * cells.mass.pair(simd, pair) * seen;
+                left = left + light * all;
+                left_of_lobes = left_of_lobes + light * lobes;
+            }
+            even = left_of_lobes.sum() / (albedo * most_seen);
         }
         let left = left.sum() / of_all.sum().max(f32::MIN_POSITIVE);
         let counts = counts.with_brdf_share(MOST * left);
