@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use anyhow::{Context as _, Result};
 use domelight::picture::tone::ToneMapping;
 use domelight::render::{
-    Film, Layers, RenderSettings, Rendering, automatic_exposure, pilot_points,
+    Film, Layers, RenderSettings, Rendering, automatic_exposure, pilot_points, portals,
 };
 use domelight::scene::Camera;
 use domelight::strategy::PreparedStrategy;
@@ -31,7 +31,7 @@ use domelight_lab::black;
 use domelight_lab::denoise::Denoiser;
 use domelight_lab::display::Display;
 use domelight_lab::job::value::{Rotation, Size, Text};
-use domelight_lab::job::{Job, Sampling};
+use domelight_lab::job::{Job, PortalList, Sampling};
 use domelight_lab::names::file_name;
 use domelight_lab::scene::PreparedScene;
 use domelight_lab::{Stopwatch, refuse_repeating_points, warn_of_rare_acceptance};
@@ -179,6 +179,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         report.png = Some(Shown::new(&job.output, &shown_as).metered(automatic.basis));
     }
     if arguments.output.json {
+        report.found_portals = found_portals(view, settings);
         report.print_json()?;
     } else if !quiet {
         report.print_summary();
@@ -253,4 +254,12 @@ impl OutputArguments {
         }
         Ok(paths)
     }
+}
+
+/// The portals that a render finds because the scene names none, in the notation of `--portal`.
+fn found_portals(view: &PreparedScene, settings: &RenderSettings) -> Option<String> {
+    let PreparedScene { scene, camera, .. } = view;
+    let found = portals(scene, camera, settings);
+    let is_found = scene.portals().is_empty() && !found.is_empty();
+    is_found.then(|| PortalList::of(&found, scene).to_string())
 }

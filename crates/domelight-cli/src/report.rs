@@ -89,6 +89,8 @@ pub(crate) struct RenderReport {
     non_finite_samples: u64,
     /// The acceptance of the strategy rejection, at the centers of pixels spread over the picture.
     rejection: Option<Acceptance>,
+    /// Portals that were found, because the scene names none, in the notation of `--portal`.
+    pub(crate) found_portals: Option<String>,
     complete: bool,
     stopped: Option<StopReason>,
     outputs: Vec<String>,
@@ -141,6 +143,7 @@ impl RenderReport {
             peak_memory_bytes: peak_memory(),
             non_finite_samples: counts.non_finite,
             rejection,
+            found_portals: None,
             complete: rendering.complete,
             stopped,
             outputs: outputs.iter().map(ToString::to_string).collect(),

@@ -31,7 +31,7 @@ pub use light::{Light, probe_name};
 pub use options::{JobOption, options};
 pub use output::Tone;
 pub use sampling::{Pixel, Sampling};
-pub use subject::{NamedMaterial, Subject};
+pub use subject::{NamedMaterial, PortalList, Subject};
 use value::{Size, Text};
 pub use view::View;
 
@@ -409,6 +409,7 @@ mod tests {
         ("sampling.strategy", &["mis:3:1", "sir:15/800", "product"]),
         ("sampling.spp", &["1", "16777216"]),
         ("sampling.adaptive", &["false"]),
+        ("sampling.find_portals", &["false"]),
         ("sampling.passes", &["doubling"]),
         ("sampling.target_error", &["0.001"]),
         ("pixel.seed", &["7", "18446744073709551615"]),

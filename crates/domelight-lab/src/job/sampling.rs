@@ -29,6 +29,10 @@ pub struct Sampling {
     #[arg(id = "sampling.adaptive", long = "no-adaptive", action = clap::ArgAction::SetFalse, help =
           "With product, take the same number of camera samples in every pixel, but for the second sets of the variance layer")]
     pub adaptive: bool,
+    /// Look for the windows of a room where the scene names no portals; product looks through them for light first
+    #[arg(id = "sampling.find_portals", long = "no-find-portals", action = clap::ArgAction::SetFalse, help =
+          "Do not look for the windows of a room, through which product looks for light first where the scene names no portals")]
+    pub find_portals: bool,
     /// How the camera samples are divided into passes over the picture; only product depends on it
     #[arg(
         id = "sampling.passes",
@@ -78,6 +82,7 @@ impl Sampling {
         RenderSettings {
             n_samples: self.spp.get(),
             adaptive: self.adaptive,
+            find_portals: self.find_portals,
             target_error: self.target_error.map(Positive::get),
             passes: self.passes.0,
             ..others

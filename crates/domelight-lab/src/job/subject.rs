@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use domelight::bsdf::{Bsdf, MaterialSpec, ParseMaterialError};
 use domelight::math::{DVec3, Vec3};
-use domelight::scene::SceneDescription;
+use domelight::scene::{Scene, SceneDescription};
 use domelight::strategy::{Portal, PortalError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -116,6 +116,20 @@ impl fmt::Display for PortalList {
 }
 
 impl PortalList {
+    /// Portals of a built scene, which are in units of [`Scene::unit`].
+    pub fn of(portals: &[Portal], scene: &Scene) -> Self {
+        // As many digits as the numbers have.
+        let short = |x: f64| format!("{x:.6e}").parse::<f64>().unwrap_or(x) + 0.0;
+        let unit = f64::from(scene.unit());
+        let inside = |v: Vec3| (v.as_dvec3() * unit).to_array().map(short);
+        let portal = |portal: &Portal| {
+            let corner = DVec3::from(inside(portal.corner())) + scene.offset();
+            let edges = portal.edges().map(|edge| DVec3::from(inside(edge)).as_vec3());
+            (corner.to_array(), edges)
+        };
+        Self(portals.iter().map(portal).collect())
+    }
+
     /// The portals, in the coordinates of the description.
     fn relative_to(&self, offset: DVec3) -> impl Iterator<Item = Portal> {
         let portal = move |&(corner, edges): &([f64; 3], [Vec3; 2])| {

@@ -28,6 +28,7 @@ class RenderOptions(PictureOptions, total=False):
 
     spp: int
     adaptive: bool
+    find_portals: bool
     passes: Passes
     target_error: float | None
 

@@ -12,18 +12,24 @@ pub struct Enclosure {
     pub open: f64,
     /// Whether the scene names portals.
     pub has_portals: bool,
+    /// The number of portals that renders find because the scene names none.
+    pub found_portals: usize,
 }
 
 impl Enclosure {
     /// `None` for a surface that sees a good part of the map.
-    pub(super) fn of(hemisphere: &Hemisphere, has_portals: bool) -> Option<Self> {
+    pub(super) fn of(
+        hemisphere: &Hemisphere,
+        has_portals: bool,
+        found_portals: usize,
+    ) -> Option<Self> {
         /// The fraction of the hemisphere below which a surface is in a room.
         const ROOM: f64 = 0.1;
         let seen: f64 = hemisphere.visibility.iter().map(|&v| f64::from(v)).sum();
         // The maps' disk covers π/4 of their square.
         let all = std::f64::consts::FRAC_PI_4 * hemisphere.visibility.len() as f64;
         let open = (seen / all).min(1.0);
-        (open < ROOM).then_some(Self { open, has_portals })
+        (open < ROOM).then_some(Self { open, has_portals, found_portals })
     }
 }
 
@@ -35,9 +41,11 @@ impl fmt::Display for Enclosure {
             return Ok(());
         }
         write!(f, "; what is open holds {open} of the sphere")?;
-        if !self.has_portals {
-            f.write_str(": name it as a portal, and product needs far fewer rays")?;
+        match self.found_portals {
+            _ if self.has_portals => Ok(()),
+            0 => f.write_str(": name it as a portal, and product needs far fewer rays"),
+            1 => f.write_str(", through a window that product looks through first"),
+            n => write!(f, ", through {n} windows that product looks through first"),
         }
-        Ok(())
     }
 }

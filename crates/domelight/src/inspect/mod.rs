@@ -40,13 +40,15 @@ pub use enclosure::Enclosure;
 pub use hemisphere::{DirectionHistogram, DirectionSample, Hemisphere};
 pub use regions::{Source, SourceKind};
 
+use std::borrow::Cow;
+
 use crate::environment::Environment;
 use crate::geometry::{Ray, RayBatch};
 use crate::math::Vec3;
-use crate::render::{Background, FilterSampler, RenderSettings, visibility};
+use crate::render::{Background, FilterSampler, RenderSettings, portals, visibility};
 use crate::sampling::{Dimension, Heuristic, Sampler};
 use crate::scene::{Camera, Scene, Sight};
-use crate::strategy::{LightTable, MultipleImportanceSampling, ShadingPoint, Strategy};
+use crate::strategy::{LightTable, MultipleImportanceSampling, Portal, ShadingPoint, Strategy};
 use crate::{Rgb, math::vec2};
 use regions::Regions;
 use replicates::Replicates;
@@ -99,6 +101,7 @@ pub struct Inspector<'a> {
     light: KnownLight,
     /// The longest extent of the scene, in its units.
     extent: f32,
+    portals: Cow<'a, [Portal]>,
 }
 
 /// What multiple importance sampling knows of the light, for strategies that find some of it rarely.
@@ -171,6 +174,7 @@ impl<'a> Inspector<'a> {
         if x >= width || y >= height {
             return Err(InspectError::Outside { x, y, width, height });
         }
+        let portals = portals(scene, camera, settings);
         let camera = scene.camera_inside(camera);
         let sampler = Sampler::new(settings.sampler, settings.seed, (y * width + x) as u64);
         let [film, lens] = [Dimension::Film, Dimension::Lens].map(|d| sampler.set(d));
@@ -216,6 +220,7 @@ impl<'a> Inspector<'a> {
             regions: Regions::of(environment),
             light: KnownLight::default(),
             extent: scene.extent(),
+            portals,
         };
         inspector.light = inspector.known_light();
         Ok(inspector)
@@ -262,7 +267,8 @@ impl<'a> Inspector<'a> {
     pub fn enclosure(&self) -> Option<Enclosure> {
         /// Pixels along an edge of the maps from which it is computed.
         const RESOLUTION: usize = 32;
-        Enclosure::of(&self.hemisphere(RESOLUTION)?, !self.scene.portals().is_empty())
+        let (named, all) = (self.scene.portals().len(), self.portals.len());
+        Enclosure::of(&self.hemisphere(RESOLUTION)?, named > 0, all - named)
     }
 
     /// The distribution of a strategy's rays from that hit, as a map of `resolution` by `resolution` pixels; `None`
@@ -273,8 +279,7 @@ impl<'a> Inspector<'a> {
         resolution: usize,
     ) -> Option<DirectionHistogram> {
         let point = self.representative.as_ref()?;
-        let rays =
-            replicates::rays_of_one_point(point, strategy, self.scene.portals(), &self.settings);
+        let rays = replicates::rays_of_one_point(point, strategy, &self.portals, &self.settings);
         let wi: Vec<Vec3> = rays.iter().map(|&(wi, _)| wi).collect();
         let visibility = self.trace(point, &wi);
         Some(DirectionHistogram::new(point, &rays, &visibility, resolution))
@@ -302,7 +307,7 @@ impl<'a> Inspector<'a> {
             &self.samples,
             strategy,
             &self.settings,
-            self.scene.portals(),
+            &self.portals,
             &self.regions,
             self.environment,
             trace,

@@ -12,6 +12,7 @@ mod exposure;
 mod film;
 mod filter;
 mod layers;
+mod openings;
 #[cfg(feature = "io")]
 mod output;
 #[cfg(feature = "io")]
@@ -24,6 +25,7 @@ mod tiling;
 mod variance;
 pub(crate) mod visibility;
 
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 #[cfg(feature = "io")]
@@ -33,6 +35,7 @@ pub use exposure::{AutomaticExposure, ExposureBasis, automatic_exposure};
 pub use film::{Film, FilmMismatch};
 pub use filter::{Filter, FilterSampler, UnknownFilter};
 pub use layers::{LAYERS, LayerInfo, LayerValues, Layers};
+pub use openings::portals;
 #[cfg(feature = "io")]
 pub use output::Developed;
 #[cfg(feature = "io")]
@@ -50,7 +53,7 @@ use crate::math::{FRAC_1_PI, Vec3};
 use crate::sampling::SamplerKind;
 use crate::scene::material::CATCHER_REFLECTANCE;
 use crate::scene::{Camera, Scene};
-use crate::strategy::{ShadingPoint, Strategy, StrategySpec};
+use crate::strategy::{Portal, ShadingPoint, Strategy, StrategySpec};
 
 /// What camera rays see if they leave the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -112,6 +115,8 @@ pub struct RenderSettings {
     /// smaller if 16 samples are more than enough. Stopping based on the samples biases a picture by far less than
     /// the error.
     pub target_error: Option<f32>,
+    /// Whether to look for portals, such as windows, where the scene names none; see [`portals`].
+    pub find_portals: bool,
     /// The division of the samples into passes. Ignored with a target error, which sets the lengths of passes.
     pub passes: Passes,
     /// The seed of all random numbers.
@@ -141,6 +146,7 @@ impl Default for RenderSettings {
             height: 512,
             n_samples: 64,
             adaptive: true,
+            find_portals: true,
             target_error: None,
             passes: Passes::default(),
             seed: 0,
@@ -237,6 +243,8 @@ struct RenderContext<'a> {
     filter: FilterSampler,
     /// The longest extent of the scene, in its units.
     extent: f32,
+    /// Where light enters; see [`portals`].
+    portals: Cow<'a, [Portal]>,
     /// The reflectance of shadow catchers.
     catcher: Option<Catcher>,
 }

@@ -13,11 +13,11 @@ use super::sums::PixelSums;
 use super::tile::{Counts, Mark, Pass, Scratch, Tile};
 use super::tiling::{SampleSet, Tiling, Window, paired_pass};
 use super::variance::VarianceSums;
-use super::{Catcher, Observer, RenderContext, RenderSettings, Rendering};
+use super::{Catcher, Observer, RenderContext, RenderSettings, Rendering, portals};
 use crate::environment::Environment;
 use crate::sampling::Sampler;
 use crate::scene::{Camera, Scene};
-use crate::strategy::{PrepareError, PreparedStrategy, Strategy, StrategySpec};
+use crate::strategy::{Portal, PrepareError, PreparedStrategy, Strategy, StrategySpec};
 
 /// A progressive render.
 ///
@@ -146,10 +146,19 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         settings: RenderSettings,
     ) -> Self {
         let filter = FilterSampler::new(settings.filter);
+        let portals = portals(scene, camera, &settings);
         let (camera, extent) = (scene.camera_inside(camera), scene.extent());
         let catcher = Catcher::of(scene, environment);
-        let context =
-            RenderContext { scene, camera, environment, settings, filter, extent, catcher };
+        let context = RenderContext {
+            scene,
+            camera,
+            environment,
+            settings,
+            filter,
+            extent,
+            portals,
+            catcher,
+        };
         Self::of_context(context, strategy)
     }
 
@@ -195,6 +204,11 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     /// The settings of the render.
     pub fn settings(&self) -> &RenderSettings {
         &self.context.settings
+    }
+
+    /// Where the strategy looks for light first, in units of [`Scene::unit`]; see [`portals`].
+    pub fn portals(&self) -> &[Portal] {
+        &self.context.portals
     }
 
     /// The division of the picture into tiles.
@@ -422,7 +436,8 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         };
         let camera = self.context.camera.resized((width, height), (columns, rows));
         let filter = FilterSampler::new(settings.filter);
-        let context = RenderContext { camera, settings, filter, ..self.context };
+        let portals = self.context.portals.clone();
+        let context = RenderContext { camera, settings, filter, portals, ..self.context };
         // Strategies that learn are made for few samples. One of another may take as long as a whole picture of `mis`.
         let coarse = if self.strategy.n_rounds() > 1 {
             Renderer::of_context(context, Held::Lent(&*self.strategy)).finish()

@@ -151,7 +151,8 @@ pub(super) fn scout<S: Strategy>(
     const FEWEST_SAMPLES: u32 = 4;
     let RenderSettings { width, height, seed, .. } = context.settings;
     let settings = RenderSettings { seed: !seed, ..context.settings };
-    let context = &RenderContext { settings, filter: context.filter.clone(), ..*context };
+    let (filter, portals) = (context.filter.clone(), context.portals.clone());
+    let context = &RenderContext { settings, filter, portals, ..*context };
     let sampler = Sampler::for_pass(settings.sampler, settings.seed, 0);
     let n_samples = (pass.n_samples / SAMPLES_DIVISOR).max(FEWEST_SAMPLES).min(pass.n_samples);
     // Prepare it for as many samples as the picture's, because the findings are about its cells.

@@ -816,7 +816,7 @@ impl<'a, S: Strategy> StrategyContext<'a, S> {
     ) -> TileShading<'a> {
         let scene = self.context.scene;
         TileShading {
-            portals: scene.portals(),
+            portals: &self.context.portals,
             brightness: self.brightness,
             instruction_set: scene.bvh().instruction_set(),
             ..TileShading::new(points, samples, pixels, self.width)

@@ -46,7 +46,7 @@ pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, Uv
 use crate::bsdf::Bsdf;
 use crate::bvh::{self, Bvh, BvhError, InstructionSet};
 use crate::geometry::{Aabb, Mesh, MeshError, Similarity};
-use crate::math::{Mat4, Vec3};
+use crate::math::{DVec3, Mat4, Vec3};
 use crate::strategy::Portal;
 use coverage::Partial;
 use subject::{framed_points, usual_scale};
@@ -97,6 +97,8 @@ pub struct Scene {
     up: UpAxis,
     /// In units of the BVH.
     portals: Vec<Portal>,
+    /// The origin of the description, in the coordinates of the file.
+    offset: DVec3,
 }
 
 /// A copy of a part.
@@ -200,6 +202,7 @@ impl Scene {
             up,
             view,
             portals,
+            offset,
             ..
         } = description;
         let to_unit = Mat4::from_scale(Vec3::splat(scale));
@@ -267,6 +270,7 @@ impl Scene {
             camera,
             up,
             portals,
+            offset,
         })
     }
 
@@ -327,6 +331,11 @@ impl Scene {
     /// Where light enters, in units of the BVH; see [`SceneDescription::portals`].
     pub fn portals(&self) -> &[Portal] {
         &self.portals
+    }
+
+    /// The point of the file that is the description's origin; see [`SceneDescription::offset`].
+    pub fn offset(&self) -> DVec3 {
+        self.offset
     }
 
     /// Converts a camera from the units of the description to those of the BVH; see [`Scene::unit`]. Renders do this

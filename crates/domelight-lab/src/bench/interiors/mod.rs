@@ -21,8 +21,38 @@ const SIZE: [usize; 2] = [128, 128];
 const MATERIALS: [&str; 2] = ["diffuse:0.7", "ggx:0.2"];
 /// Camera samples of the measured pictures.
 const SAMPLES: [u32; 2] = [4, 16];
-/// Without portals, and with them, where the second is the usual way to sample them.
-const STRATEGIES: [&[&str]; 2] = [&["mis:4:4", "product:4"], &["mis:1:1:portals=4", "product:4"]];
+/// What strategies know of the openings of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Portals {
+    None,
+    /// What the renderer finds.
+    Found,
+    Named,
+}
+
+impl Portals {
+    const ALL: [Self; 3] = [Self::None, Self::Found, Self::Named];
+
+    /// The strategies that are measured, with the usual way to sample portals.
+    fn strategies(self) -> &'static [&'static str] {
+        match self {
+            Self::None => &["mis:4:4", "product:4"],
+            Self::Found => &["product:4"],
+            Self::Named => &["mis:1:1:portals=4", "product:4"],
+        }
+    }
+
+    /// As a part of a strategy's name.
+    fn label(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::Found => ", portals found",
+            Self::Named => ", portals named",
+        }
+    }
+}
+
 /// A reference's strategy, and the camera samples of each of its halves.
 const REFERENCE: &str = "product:8";
 const REFERENCE_SAMPLES: u32 = 1024;
@@ -36,8 +66,7 @@ pub(super) struct Row {
     probe: String,
     material: String,
     strategy: String,
-    /// Whether the strategy knows the scene's portals.
-    portals: bool,
+    portals: Portals,
     samples: u32,
     /// Mean over the seeds.
     rel_mse: f64,
@@ -111,7 +140,7 @@ impl<'a> InteriorCase<'a> {
             settings,
             halves: [Vec::new(), Vec::new()],
         };
-        let best = case.scenes.len() - 1;
+        let best = if case.scenes.len() > 1 { Portals::Named } else { Portals::Found };
         for half in 0..2 {
             bench.host.check_canceled()?;
             let seed = REFERENCE_SEED + half as u64;
@@ -123,13 +152,14 @@ impl<'a> InteriorCase<'a> {
     /// The picture and the number of its shadow rays, with those of scouts.
     fn render(
         &self,
-        scene: usize,
+        portals: Portals,
         strategy: &str,
         n_samples: u32,
         seed: u64,
     ) -> Result<(Vec<Rgb>, u64), Error> {
-        let (scene, camera) = &self.scenes[scene];
-        let settings = RenderSettings { n_samples, seed, ..self.settings };
+        let (scene, camera) = &self.scenes[usize::from(portals == Portals::Named)];
+        let find_portals = portals == Portals::Found;
+        let settings = RenderSettings { n_samples, seed, find_portals, ..self.settings };
         let spec: StrategySpec =
             strategy.parse().map_err(|e| Error::Usage(format!("{strategy}: {e}")))?;
         let spec = spec.for_picture(scene, camera, self.environment, &settings);
@@ -144,9 +174,10 @@ impl<'a> InteriorCase<'a> {
     fn measure(&self, bench: &Bench) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
         for samples in SAMPLES {
-            for (scene, strategies) in STRATEGIES.iter().enumerate().take(self.scenes.len()) {
-                for strategy in *strategies {
-                    rows.push(self.measure_one(bench, strategy, scene, samples)?);
+            let has_named = self.scenes.len() > 1;
+            for portals in Portals::ALL.into_iter().filter(|&p| has_named || p != Portals::Named) {
+                for strategy in portals.strategies() {
+                    rows.push(self.measure_one(bench, strategy, portals, samples)?);
                 }
             }
         }
@@ -157,7 +188,7 @@ impl<'a> InteriorCase<'a> {
         &self,
         bench: &Bench,
         strategy: &str,
-        scene: usize,
+        portals: Portals,
         samples: u32,
     ) -> Result<Row, Error> {
         let n_seeds = bench.settings.n_seeds;
@@ -167,7 +198,7 @@ impl<'a> InteriorCase<'a> {
             bench.host.check_canceled()?;
             let mut watch = Stopwatch::start();
             let (picture, n_rays) =
-                self.render(scene, strategy, samples, bench.settings.seed + seed)?;
+                self.render(portals, strategy, samples, bench.settings.seed + seed)?;
             let time = watch.lap();
             cpu_seconds += time.cpu.unwrap_or(time.wall) / f64::from(n_seeds);
             rays += n_rays as f64;
@@ -181,7 +212,7 @@ impl<'a> InteriorCase<'a> {
             probe: String::new(),
             material: String::new(),
             strategy: strategy.to_owned(),
-            portals: scene > 0,
+            portals,
             samples,
             rel_mse: sum / n / f64::from(n_seeds),
             shadow_rays_per_pixel: rays / n / f64::from(n_seeds),
@@ -218,10 +249,9 @@ pub(super) fn tables(rows: &[Row]) -> Vec<Table> {
     ];
     let mut table = Table::new("Interiors", &head);
     for row in rows {
-        let portals = if row.portals { " with portals" } else { "" };
         table.rows.push(vec![
             format!("{} / {} / {}", row.scene, row.probe, row.material),
-            format!("{}{portals}", row.strategy),
+            format!("{}{}", row.strategy, row.portals.label()),
             row.samples.to_string(),
             number(row.rel_mse),
             number(row.shadow_rays_per_pixel),
