@@ -106,16 +106,8 @@ impl IblArguments {
 
     /// States what the format cannot hold.
     fn report_clipped(&self, clipped: ClippedLight, probe: &str, quiet: bool) -> Result<()> {
-        if clipped.texels == 0 {
-            return Ok(());
-        }
-        let largest = self.radiance_file().largest();
-        let text = format!(
-            "{probe}: {} texels are brighter than {largest}, the most that the format holds, and are clipped: level 0 \
-             loses {:.2} % of its light; rougher levels are filtered before that",
-            clipped.texels,
-            100.0 * clipped.lost
-        );
+        let Some(text) = clipped.warning() else { return Ok(()) };
+        let text = format!("{probe}: {text}");
         if self.light.strict {
             return Err(UsageError(format!("{text}; without --strict it is clipped")).into());
         }

@@ -1,6 +1,6 @@
 //! What was rendered, in words and numbers.
 
-use domelight::environment::{Environment, UpAxis};
+use domelight::environment::Environment;
 use domelight::math::{DVec3, Vec3};
 use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
@@ -72,10 +72,7 @@ impl EnvironmentReport {
             rotate: light.rotate_degrees,
             scale: light.scale,
             exposure: light.exposure,
-            up: match light.up {
-                UpAxis::Y => "y",
-                UpAxis::Z => "z",
-            },
+            up: light.up.name(),
         }
     }
 }

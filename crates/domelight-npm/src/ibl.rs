@@ -1,17 +1,17 @@
 //! Prefiltered light as files of textures.
 
 use domelight::Rgb;
-use domelight::picture::texture::{ClippedLight, Container, TexelFormat, Texture};
+use domelight::picture::texture::{Container, TexelFormat, Texture};
 use domelight::rig::RigError;
 use domelight::rig::ibl::{
     BrdfTable, Engine, IblSettings, PrefilteredLight, SunError, SunTreatment, TreatedEnvironment,
-    UnknownEngine, UnknownSunTreatment, prefilter,
+    prefilter,
 };
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
 
 use crate::map::LightMap;
-use crate::options::{parse, to_json};
+use crate::options::{named, parse, to_json};
 
 /// The options of prefiltered light, as those of `domelight ibl`.
 #[derive(Deserialize)]
@@ -21,8 +21,8 @@ struct IblOptions {
     #[serde(rename = "for")]
     engine: Option<String>,
     sun: String,
-    texels: Texels,
-    container: ContainerName,
+    texels: String,
+    container: String,
 }
 
 impl Default for IblOptions {
@@ -31,24 +31,10 @@ impl Default for IblOptions {
             size: 256,
             engine: None,
             sun: "keep".to_owned(),
-            texels: Texels::Rgb9e5,
-            container: ContainerName::Ktx2,
+            texels: TexelFormat::SharedExponent.name().to_owned(),
+            container: Container::Ktx2.name().to_owned(),
         }
     }
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Texels {
-    Rgb9e5,
-    Half,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum ContainerName {
-    Ktx2,
-    Dds,
 }
 
 /// Files of prefiltered light.
@@ -76,13 +62,7 @@ struct Level {
 
 impl IblOptions {
     fn engine(&self) -> Result<Option<Engine>, JsError> {
-        let unknown = |e: UnknownEngine| JsError::new(&format!("ibl: option for: {e}"));
-        self.engine.as_deref().map(str::parse).transpose().map_err(unknown)
-    }
-
-    fn sun(&self) -> Result<SunTreatment, JsError> {
-        let unknown = |e: UnknownSunTreatment| JsError::new(&format!("ibl: option sun: {e}"));
-        self.sun.parse().map_err(unknown)
+        self.engine.as_deref().map(|name| named("ibl", "for", name)).transpose()
     }
 
     fn settings(&self, engine: Option<Engine>) -> Result<IblSettings, JsError> {
@@ -92,23 +72,12 @@ impl IblOptions {
         }
         Ok(IblSettings::for_engine(engine, self.size))
     }
+}
 
-    fn format(&self) -> TexelFormat {
-        match self.texels {
-            Texels::Rgb9e5 => TexelFormat::SharedExponent,
-            Texels::Half => TexelFormat::Half,
-        }
-    }
-
-    fn encode(&self, texture: &Texture) -> Result<Vec<u8>, JsError> {
-        let container = match self.container {
-            ContainerName::Ktx2 => Container::Ktx2,
-            ContainerName::Dds => Container::Dds,
-        };
-        let mut bytes = Vec::new();
-        container.encode(texture, &mut bytes).map_err(|e| JsError::new(&e.to_string()))?;
-        Ok(bytes)
-    }
+fn encoded(container: Container, texture: &Texture) -> Result<Vec<u8>, JsError> {
+    let mut bytes = Vec::new();
+    container.encode(texture, &mut bytes).map_err(|e| JsError::new(&e.to_string()))?;
+    Ok(bytes)
 }
 
 /// The light with its sun treated, and what there is to say of it.
@@ -143,38 +112,24 @@ impl LightMap {
         let options: IblOptions = parse("ibl", options)?;
         let engine = options.engine()?;
         let settings = options.settings(engine)?;
-        let (treated, warning) = treated(self, options.sun()?)?;
+        let texels: TexelFormat = named("ibl", "texels", &options.texels)?;
+        let container: Container = named("ibl", "container", &options.container)?;
+        let (treated, warning) = treated(self, named("ibl", "sun", &options.sun)?)?;
         let light =
             prefilter(&treated.environment, &settings).map_err(|e| JsError::new(&e.to_string()))?;
-        let (radiance, clipped) = Texture::cube(&light.levels, options.format());
-        let (irradiance, _) =
-            Texture::cube(std::slice::from_ref(&light.irradiance), options.format());
+        let (radiance, clipped) = Texture::cube(&light.levels, texels);
+        let (irradiance, _) = Texture::cube(std::slice::from_ref(&light.irradiance), texels);
+        let clipped = clipped.warning().map(|text| format!("{}: {text}", self.name));
         let brdf = Texture::table(&BrdfTable::new(BrdfTable::SIZE, Engine::terms(engine)));
         Ok(Prefiltered {
-            radiance: options.encode(&radiance)?,
-            irradiance: options.encode(&irradiance)?,
-            brdf: options.encode(&brdf)?,
+            radiance: encoded(container, &radiance)?,
+            irradiance: encoded(container, &irradiance)?,
+            brdf: encoded(container, &brdf)?,
             report: to_json(&Report {
                 levels: levels(&light, &settings),
                 harmonics: light.harmonics.coefficients.map(Rgb::to_array),
-                warnings: warning
-                    .into_iter()
-                    .chain(self.clipped(clipped, options.format()))
-                    .collect(),
+                warnings: warning.into_iter().chain(clipped).collect(),
             }),
-        })
-    }
-
-    /// A warning of texels that the format cannot hold.
-    fn clipped(&self, clipped: ClippedLight, format: TexelFormat) -> Option<String> {
-        let (name, largest) = (&self.name, format.largest());
-        let percent = 100.0 * clipped.lost;
-        (clipped.texels > 0).then(|| {
-            format!(
-                "{name}: {} texels are brighter than {largest}, the most that the format holds, and are clipped: level 0 \
-                 loses {percent:.2} % of its light; rougher levels are filtered before that",
-                clipped.texels
-            )
         })
     }
 }

@@ -2,15 +2,15 @@
 
 use domelight::Rgb;
 use domelight::rig::{
-    Extraction, ExtractionSettings, MedianCut, Method, RigLight, ShadingError, ShadingReference,
-    SphericalHarmonics, VarianceMinimization, extract, light_names, smallest_rig,
+    Extraction, ExtractionSettings, RigLight, ShadingError, ShadingReference, SphericalHarmonics,
+    extract, light_names, smallest_rig,
 };
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
 
 use crate::error;
 use crate::map::LightMap;
-use crate::options::{parse, to_json};
+use crate::options::{named, parse, to_json};
 
 /// The number of lights where nothing is said.
 const N_LIGHTS: usize = 64;
@@ -24,23 +24,12 @@ struct LightOptions {
     error: Option<f64>,
     sun: bool,
     lamps: usize,
-    method: MethodName,
+    method: Option<String>,
     min_share: Option<f32>,
     /// Whether what the lights leave of the map is wanted.
     residual: bool,
     /// Whether the error is measured.
     measure: bool,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum MethodName {
-    #[default]
-    VarianceMinimization,
-    /// The rule of Viriyothai & Debevec 2009.
-    #[serde(rename = "variance-minimization:2009")]
-    Poster,
-    MedianCut,
 }
 
 /// Lights, and what they leave of the map.
@@ -79,25 +68,20 @@ struct ErrorReport {
 }
 
 impl LightOptions {
-    fn settings(&self) -> ExtractionSettings {
+    fn settings(&self) -> Result<ExtractionSettings, JsError> {
         let has_compact = self.sun || self.lamps > 0;
-        ExtractionSettings {
+        let method = self.method.as_deref().map(|name| named("lights", "method", name));
+        Ok(ExtractionSettings {
             sun: self.sun,
             n_lamps: self.lamps,
             n_lights: self.n.or((!has_compact).then_some(N_LIGHTS)),
-            method: match self.method {
-                MethodName::VarianceMinimization => {
-                    Method::VarianceMinimization(VarianceMinimization::default())
-                }
-                MethodName::Poster => Method::VarianceMinimization(VarianceMinimization::poster()),
-                MethodName::MedianCut => Method::MedianCut(MedianCut::default()),
-            },
+            method: method.transpose()?.unwrap_or_default(),
             min_share: self.min_share,
-        }
+        })
     }
 
     fn extract(&self, map: &LightMap) -> Result<(Extraction, Option<ShadingError>), JsError> {
-        let (environment, settings) = (&map.environment, self.settings());
+        let (environment, settings) = (&map.environment, self.settings()?);
         if let Some(percent) = self.error {
             if self.n.is_some() {
                 return Err(JsError::new(

@@ -1,11 +1,11 @@
 //! A light probe as an environment.
 
+use std::fmt::Display;
 use std::str::FromStr;
 
 use domelight::environment::builtin::BuiltinProbe;
-use domelight::environment::convention::{Convention, UnknownConvention};
+use domelight::environment::convention::Convention;
 use domelight::environment::io::{ProbeOptions, probe_from_bytes, reduced_probe_from_bytes};
-use domelight::environment::mapping::UnknownMapping;
 use domelight::environment::{Environment, EnvironmentError, Orientation, UpAxis, radiance_factor};
 use domelight::rig::{SphericalGaussians, SphericalHarmonics};
 use domelight::{Rgb, RgbImage};
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
 
 use crate::error;
-use crate::options::{parse, to_json};
+use crate::options::{named, parse, to_json};
 
 /// The most that reading a probe takes: an instance of WebAssembly has 4 GiB at the most \[bytes\].
 const MAX_MEMORY: u64 = 1 << 30;
@@ -47,7 +47,7 @@ struct MapOptions {
     scale: f32,
     /// \[stops\]
     exposure: f32,
-    up: Option<Up>,
+    up: Option<String>,
     mapping: Option<String>,
     layer: Option<String>,
     strict: bool,
@@ -74,31 +74,6 @@ impl Default for MapOptions {
     }
 }
 
-#[derive(Clone, Copy, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Up {
-    Y,
-    Z,
-}
-
-impl From<Up> for UpAxis {
-    fn from(up: Up) -> Self {
-        match up {
-            Up::Y => Self::Y,
-            Up::Z => Self::Z,
-        }
-    }
-}
-
-impl From<UpAxis> for Up {
-    fn from(up: UpAxis) -> Self {
-        match up {
-            UpAxis::Y => Self::Y,
-            UpAxis::Z => Self::Z,
-        }
-    }
-}
-
 /// What a map is, for JavaScript.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -108,26 +83,24 @@ struct Description {
     height: usize,
     /// Of the map's center from −Z, or from +Y if z is up \[degrees\].
     rotation: f32,
-    up: Up,
+    up: String,
     /// Whether somebody said which axis is up.
     up_is_given: bool,
     warnings: Vec<String>,
 }
 
-impl MapOptions {
-    fn convention(&self) -> Result<Option<Convention>, JsError> {
-        let parsed = self.convention.as_deref().map(Convention::from_str).transpose();
-        parsed.map_err(|e: UnknownConvention| {
-            let known = Convention::ALL.map(Convention::name).join(", ");
-            JsError::new(&format!("load: option convention: {e}; known are {known}"))
-        })
-    }
+/// The value that an option names, if it is given.
+fn option<T: FromStr<Err: Display>>(
+    option: &str,
+    name: Option<&str>,
+) -> Result<Option<T>, JsError> {
+    name.map(|name| named("load", option, name)).transpose()
+}
 
+impl MapOptions {
     fn probe_options(&self) -> Result<ProbeOptions, JsError> {
-        let mapping = self.mapping.as_deref().map(str::parse).transpose();
-        let unknown = |e: UnknownMapping| JsError::new(&format!("load: option mapping: {e}"));
         Ok(ProbeOptions {
-            mapping: mapping.map_err(unknown)?,
+            mapping: option("mapping", self.mapping.as_deref())?,
             layer: self.layer.clone(),
             strict: self.strict,
             max_memory: Some(MAX_MEMORY),
@@ -142,12 +115,12 @@ impl MapOptions {
         name: &str,
         warnings: Vec<String>,
     ) -> Result<LightMap, JsError> {
-        let convention = self.convention()?;
+        let convention: Option<Convention> = option("convention", self.convention.as_deref())?;
         let image = match convention {
             Some(program) => program.from_program(image),
             None => image,
         };
-        let up = self.up.map(UpAxis::from);
+        let up: Option<UpAxis> = option("up", self.up.as_deref())?;
         let turn = convention.map_or(0.0, Convention::rotation);
         let orientation = Orientation { up: up.unwrap_or_default(), rotation: self.rotate + turn };
         let failed = |e: EnvironmentError| JsError::new(&format!("{name}: {e}"));
@@ -203,7 +176,7 @@ impl LightMap {
             width,
             height,
             rotation: orientation.rotation,
-            up: orientation.up.into(),
+            up: orientation.up.name().to_owned(),
             up_is_given: self.up.is_some(),
             warnings: self.warnings.clone(),
         })
@@ -215,11 +188,11 @@ impl LightMap {
     /// If they do not fit.
     #[wasm_bindgen(js_name = fromPixels)]
     pub fn from_pixels(pixels: &[f32], description: &str) -> Result<Self, JsError> {
-        let failed = |e: &dyn std::fmt::Display| JsError::new(&e.to_string());
+        let failed = |e: &dyn Display| JsError::new(&e.to_string());
         let of: Description = serde_json::from_str(description).map_err(|e| failed(&e))?;
         let texels = pixels.as_chunks().0.iter().map(|&[r, g, b, _]| Rgb::new(r, g, b)).collect();
         let image = RgbImage::new(of.width, of.height, texels);
-        let up = UpAxis::from(of.up);
+        let up: UpAxis = of.up.parse().map_err(|e| failed(&e))?;
         let orientation = Orientation { up, rotation: of.rotation };
         let environment = Environment::new(image, orientation, 1.0).map_err(|e| failed(&e))?;
         let up = of.up_is_given.then_some(up);

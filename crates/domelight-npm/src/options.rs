@@ -1,5 +1,8 @@
 //! Options of calls, as JSON.
 
+use std::fmt::Display;
+use std::str::FromStr;
+
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -17,6 +20,15 @@ pub(crate) fn parse<T: DeserializeOwned>(of: &str, json: &str) -> Result<T, JsEr
             .map_err(|e| failed(format!("option {name}: {e}")))?;
     }
     serde_json::from_value(Value::Object(options)).map_err(|e| failed(e.to_string()))
+}
+
+/// The value of a name that the option `option` of the call `of` has.
+pub(crate) fn named<T: FromStr<Err: Display>>(
+    of: &str,
+    option: &str,
+    name: &str,
+) -> Result<T, JsError> {
+    name.parse().map_err(|e| JsError::new(&format!("{of}: option {option}: {e}")))
 }
 
 /// Writes a result.

@@ -5,17 +5,14 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::picture::tone::{ToneCurve, ToneMapping, srgb_from_linear};
-use domelight::render::{
-    Background, Counts, Observer, RenderSettings, Renderer, automatic_exposure,
-};
+use domelight::render::{Background, Deadline, RenderSettings, Renderer, automatic_exposure};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
-    Camera, CameraSettings, Framing, LoadOptions, Projection, Scene, SceneDescription, load_bytes,
+    Camera, CameraSettings, LoadOptions, Projection, Scene, SceneDescription, load_bytes,
 };
 use domelight::strategy::StrategySpec;
 use domelight::{Rgb, RgbImage};
@@ -23,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
 
 use crate::map::LightMap;
-use crate::options::{parse, to_json};
+use crate::options::{named, parse, to_json};
 use crate::{error, now};
 
 /// The most that a scene and its textures take \[bytes\].
@@ -135,76 +132,17 @@ struct Report {
     warnings: Vec<String>,
 }
 
-/// Ends a step at a time, but not before it got any further.
-struct Deadline {
-    end: f64,
-    advanced: AtomicBool,
-}
-
-impl Observer for Deadline {
-    fn tile_finished(&self, _: &Counts) {
-        self.advanced.store(true, Ordering::Relaxed);
+/// The map, upright in a scene with this up axis.
+fn upright(map: &LightMap, up: UpAxis) -> Result<Cow<'_, Environment>, JsError> {
+    let environment = &map.environment;
+    let orientation = environment.orientation();
+    if map.up.is_some() || orientation.up == up {
+        return Ok(Cow::Borrowed(environment));
     }
-
-    fn canceled(&self) -> bool {
-        self.advanced.load(Ordering::Relaxed) && now() >= self.end
-    }
-}
-
-/// A scene that can be rendered, and what comes with it.
-struct Loaded {
-    scene: Scene,
-    up: UpAxis,
-    camera: Option<CameraSettings>,
-    /// What the scene was scaled by.
-    scale: f32,
-    warnings: Vec<String>,
-}
-
-impl Loaded {
-    fn new(files: &Files, name: &str, options: &RenderOptions) -> Result<Self, JsError> {
-        let (mut description, warnings) = description(files, name)?;
-        if let Some(text) = &options.material {
-            let material: MaterialSpec = text.parse().map_err(error)?;
-            description.set_subject_material(Bsdf::from(material));
-        }
-        let up = description.up.unwrap_or_default();
-        if options.ground {
-            description.add_ground(up.vector());
-        }
-        let camera = description.camera;
-        let mut view =
-            camera.unwrap_or_else(|| description.framed(&Framing::new(1.0, up.vector())));
-        let scale = description.rescale(&mut view);
-        let scene = Scene::new(description).map_err(error)?;
-        Ok(Self { scene, up, camera, scale, warnings })
-    }
-
-    fn camera(&self, options: &RenderOptions) -> Result<Camera, JsError> {
-        let RenderOptions { width, height, .. } = *options;
-        let given = options.camera.map(|camera| camera.settings(self.up));
-        let view = if let Some(mut camera) = given.or(self.camera) {
-            camera.scale(self.scale);
-            camera
-        } else {
-            let aspect = width as f32 / height as f32;
-            self.scene.framed(&Framing::new(aspect, self.up.vector()))
-        };
-        Camera::new(&view, width, height).map_err(error)
-    }
-
-    /// The map, upright in the scene.
-    fn light<'a>(&self, map: &'a LightMap) -> Result<Cow<'a, Environment>, JsError> {
-        let environment = &map.environment;
-        let orientation = environment.orientation();
-        if map.up.is_some() || orientation.up == self.up {
-            return Ok(Cow::Borrowed(environment));
-        }
-        let orientation = Orientation { up: self.up, ..orientation };
-        let texels = environment.map().clone();
-        let upright = Environment::from_units(texels, orientation, environment.unit());
-        Ok(Cow::Owned(upright.map_err(error)?))
-    }
+    let orientation = Orientation { up, ..orientation };
+    let texels = environment.map().clone();
+    let upright = Environment::from_units(texels, orientation, environment.unit());
+    Ok(Cow::Owned(upright.map_err(error)?))
 }
 
 impl CameraOptions {
@@ -243,11 +181,27 @@ impl RenderOptions {
         }
     }
 
-    fn curve(&self) -> Result<ToneCurve, JsError> {
-        let failed = |e: domelight::picture::tone::UnknownToneCurve| {
-            JsError::new(&format!("render: option tone: {e}"))
+    /// The scene with the changes that the options ask for, and warnings.
+    fn scene(&self, files: &Files, name: &str) -> Result<(Scene, Vec<String>), JsError> {
+        let (mut description, warnings) = description(files, name)?;
+        if let Some(text) = &self.material {
+            let material: MaterialSpec = text.parse().map_err(error)?;
+            description.set_subject_material(Bsdf::from(material));
+        }
+        if self.ground {
+            let up = description.up.unwrap_or_default();
+            description.add_ground(up.vector());
+        }
+        Ok((Scene::new(description).map_err(error)?, warnings))
+    }
+
+    fn camera(&self, scene: &Scene) -> Result<Camera, JsError> {
+        let Self { width, height, .. } = *self;
+        let view = match self.camera {
+            Some(camera) => camera.settings(scene.up_axis()),
+            None => scene.camera(width as f32 / height as f32),
         };
-        ToneCurve::from_str(&self.tone).map_err(failed)
+        Camera::new(&view, width, height).map_err(error)
     }
 }
 
@@ -289,17 +243,16 @@ pub fn render(
 ) -> Result<Picture, JsError> {
     let options: RenderOptions = parse("render", options)?;
     options.check()?;
-    let curve = options.curve()?;
+    let curve: ToneCurve = named("render", "tone", &options.tone)?;
     let strategy: StrategySpec = options.strategy.parse().map_err(error)?;
-    let loaded = Loaded::new(files, name, &options)?;
-    let (scene, camera) = (&loaded.scene, &loaded.camera(&options)?);
-    let environment = &*loaded.light(map)?;
+    let (scene, warnings) = options.scene(files, name)?;
+    let (scene, camera) = (&scene, &options.camera(&scene)?);
+    let environment = &*upright(map, scene.up_axis())?;
     let settings = options.settings();
     let mut renderer =
         Renderer::new(scene, camera, environment, strategy, settings).map_err(error)?;
     while !renderer.is_complete() {
-        let deadline = Deadline { end: now() + INTERVAL, advanced: AtomicBool::new(false) };
-        renderer.step_with(&deadline);
+        renderer.step_with(&Deadline::new(now, now() + INTERVAL));
         // What the caller's function throws does not end the picture.
         let _ = progress.call1(&JsValue::NULL, &renderer.progress().into());
     }
@@ -314,7 +267,7 @@ pub fn render(
         strategy: renderer.spec().unwrap_or(strategy).to_string(),
         camera_rays: counts.camera_rays,
         shadow_rays: counts.shadow_rays,
-        warnings: loaded.warnings,
+        warnings,
     };
     let linear = color.pixels.iter().zip(&alpha).flat_map(|(c, &a)| [c.r, c.g, c.b, a]).collect();
     let display = developed(&color, &alpha, ToneMapping { exposure, curve });

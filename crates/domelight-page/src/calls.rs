@@ -13,41 +13,41 @@ macro_rules! for_each_call {
         $macro! {
             addFile = add_file(path: &str, bytes: Vec<u8>) -> ();
             clearFiles = clear_files() -> ();
-            loadScene = load_scene(settings: &str) -> String;
-            loadEnvironment = load_environment(settings: &str) -> String;
+            loadScene = load_scene(settings: &str) -> Result<String, Error>;
+            loadEnvironment = load_environment(settings: &str) -> Result<String, Error>;
             smallerMaps = smaller_maps(probe: &str) -> String;
-            turnEnvironment = turn_environment(degrees: f32) -> ();
-            automaticExposure = automatic_exposure(settings: &str) -> f32;
-            part = part() -> Vec<u8>;
-            addPart = add_part(part: &[u8]) -> ();
-            exr = exr(making: &str) -> Vec<u8>;
-            png = png(exposure: f32, curve: &str) -> Vec<u8>;
-            map = map(width: usize) -> Vec<f32>;
-            mapView = map_view(mapping: &str, rotate: f32, width: usize) -> MapView;
-            placesOf = places_of(mapping: &str, rotate: f32, places: &[f32]) -> Vec<f32>;
-            importance = importance(pixel: &str, mapping: &str, width: usize) -> MapView;
-            rayDensity = ray_density(pixel: &str, strategy: &str, mapping: &str, width: usize) -> MapView;
-            materialAt = material_at(pixel: &str) -> Option<u32>;
-            point = point(pixel: &str) -> String;
-            samples = samples(pixel: &str, strategy: &str, mapping: &str, n: usize, seed: u32) -> Vec<f32>;
-            directionAt = direction_at(pixel: &str, from: &str, a: f32, b: f32, mapping: &str) -> Vec<f32>;
-            rowProbabilities = row_probabilities(width: usize, row: usize, weighted: bool) -> String;
-            mapSamples = map_samples(n: usize, seed: u32) -> String;
-            inspect = inspect(settings: &str) -> String;
-            hemisphere = hemisphere(settings: &str, resolution: usize) -> Vec<f32>;
-            directions = directions(settings: &str, resolution: usize) -> Vec<f32>;
-            lobeSection = lobe_section(material: &str, theta_o: f32, n: usize) -> Vec<f32>;
-            lobeSamples = lobe_samples(material: &str, theta_o: f32, n: usize, seed: u32) -> Vec<f32>;
-            lights = lights(settings: &str) -> String;
-            regions = regions(settings: &str, width: usize) -> Vec<u32>;
-            rigFile = rig_file(settings: &str, format: &str, probe: &str) -> Vec<u8>;
-            domeFile = dome_file(settings: &str, name: &str) -> Vec<u8>;
-            spheres = spheres(settings: &str, size: usize, exponent: i32) -> Vec<f32>;
+            turnEnvironment = turn_environment(degrees: f32) -> Result<(), Error>;
+            automaticExposure = automatic_exposure(settings: &str) -> Result<f32, Error>;
+            part = part() -> Result<Vec<u8>, Error>;
+            addPart = add_part(part: &[u8]) -> Result<(), Error>;
+            exr = exr(making: &str) -> Result<Vec<u8>, Error>;
+            png = png(exposure: f32, curve: &str) -> Result<Vec<u8>, Error>;
+            map = map(width: usize) -> Result<Vec<f32>, Error>;
+            mapView = map_view(mapping: &str, rotate: f32, width: usize) -> Result<MapView, Error>;
+            placesOf = places_of(mapping: &str, rotate: f32, places: &[f32]) -> Result<Vec<f32>, Error>;
+            importance = importance(pixel: &str, mapping: &str, width: usize) -> Result<MapView, Error>;
+            rayDensity = ray_density(pixel: &str, strategy: &str, mapping: &str, width: usize) -> Result<MapView, Error>;
+            materialAt = material_at(pixel: &str) -> Result<Option<u32>, Error>;
+            point = point(pixel: &str) -> Result<String, Error>;
+            samples = samples(pixel: &str, strategy: &str, mapping: &str, n: usize, seed: u32) -> Result<Vec<f32>, Error>;
+            directionAt = direction_at(pixel: &str, from: &str, a: f32, b: f32, mapping: &str) -> Result<Vec<f32>, Error>;
+            rowProbabilities = row_probabilities(width: usize, row: usize, weighted: bool) -> Result<String, Error>;
+            mapSamples = map_samples(n: usize, seed: u32) -> Result<String, Error>;
+            inspect = inspect(settings: &str) -> Result<String, Error>;
+            hemisphere = hemisphere(settings: &str, resolution: usize) -> Result<Vec<f32>, Error>;
+            directions = directions(settings: &str, resolution: usize) -> Result<Vec<f32>, Error>;
+            lobeSection = lobe_section(material: &str, theta_o: f32, n: usize) -> Result<Vec<f32>, Error>;
+            lobeSamples = lobe_samples(material: &str, theta_o: f32, n: usize, seed: u32) -> Result<Vec<f32>, Error>;
+            lights = lights(settings: &str) -> Result<String, Error>;
+            regions = regions(settings: &str, width: usize) -> Result<Vec<u32>, Error>;
+            rigFile = rig_file(settings: &str, format: &str, probe: &str) -> Result<Vec<u8>, Error>;
+            domeFile = dome_file(settings: &str, name: &str) -> Result<Vec<u8>, Error>;
+            spheres = spheres(settings: &str, size: usize, exponent: i32) -> Result<Vec<f32>, Error>;
             targets = targets() -> String;
-            prefilter = prefilter(settings: &str) -> String;
-            iblFile = ibl_file(settings: &str, content: &str, container: &str) -> Vec<u8>;
-            tablesFile = tables_file(settings: &str, format: &str) -> Vec<u8>;
-            snippet = snippet(language: &str) -> Vec<u8>;
+            prefilter = prefilter(settings: &str) -> Result<String, Error>;
+            iblFile = ibl_file(settings: &str, content: &str, container: &str) -> Result<Vec<u8>, Error>;
+            tablesFile = tables_file(settings: &str, format: &str) -> Result<Vec<u8>, Error>;
+            snippet = snippet(language: &str) -> Result<Vec<u8>, Error>;
         }
     };
 }
@@ -134,11 +134,28 @@ impl<'a> FromArgument<'a> for &'a [f32] {
     }
 }
 
+/// What a method returns: a result, or a value if it cannot fail.
+trait IntoAnswer {
+    fn into_answer(self) -> Result<Answer, Error>;
+}
+
+impl<T: IntoAnswer> IntoAnswer for Result<T, Error> {
+    fn into_answer(self) -> Result<Answer, Error> {
+        self?.into_answer()
+    }
+}
+
+impl IntoAnswer for () {
+    fn into_answer(self) -> Result<Answer, Error> {
+        Ok(Answer::Nothing)
+    }
+}
+
 macro_rules! into_answer {
     ($($type:ty => $variant:ident;)*) => {
-        $(impl From<$type> for Answer {
-            fn from(value: $type) -> Self {
-                Self::$variant(value)
+        $(impl IntoAnswer for $type {
+            fn into_answer(self) -> Result<Answer, Error> {
+                Ok(Answer::$variant(self))
             }
         })*
     };
@@ -152,12 +169,6 @@ into_answer! {
     Vec<u32> => Words;
     Vec<f32> => Floats;
     MapView => Map;
-}
-
-impl From<()> for Answer {
-    fn from((): ()) -> Self {
-        Self::Nothing
-    }
 }
 
 macro_rules! dispatch {
@@ -177,8 +188,8 @@ macro_rules! dispatch {
                             let wrong = || refused(format!("{call}: there is no such {}", stringify!($argument)));
                             let $argument = <$type>::from_argument($argument).ok_or_else(wrong)?;
                         )*
-                        let result: $result = self.$method($($argument),*)?;
-                        Ok(result.into())
+                        let result: $result = self.$method($($argument),*);
+                        result.into_answer()
                     })*
                     _ => Err(refused(format!("there is no call {call:?}"))),
                 }

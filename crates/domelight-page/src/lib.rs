@@ -68,21 +68,13 @@ impl Engine {
     }
 
     /// Keeps a file that a scene or a probe may be loaded from; `path` has slashes.
-    ///
-    /// # Errors
-    /// None.
-    pub fn add_file(&mut self, path: &str, bytes: Vec<u8>) -> Result<(), Error> {
+    pub fn add_file(&mut self, path: &str, bytes: Vec<u8>) {
         self.files.add(path, bytes);
-        Ok(())
     }
 
     /// Forgets all files.
-    ///
-    /// # Errors
-    /// None.
-    pub fn clear_files(&mut self) -> Result<(), Error> {
+    pub fn clear_files(&mut self) {
         self.files = Files::default();
-        Ok(())
     }
 
     /// Whether a picture was begun of what is loaded.

@@ -7,8 +7,8 @@ use domelight::picture::exr::ExrLayers;
 use domelight::picture::hdr;
 use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
 use domelight::rig::{
-    Extraction, ExtractionSettings, MedianCut, Method, Region, Rig, ShadingReference,
-    SphericalHarmonics, VarianceMinimization, extract, quadrature,
+    Extraction, ExtractionSettings, Method, Rig, ShadingReference, SphericalHarmonics,
+    VarianceMinimization, extract, light_names, quadrature,
 };
 use serde::{Deserialize, Serialize};
 
@@ -23,23 +23,13 @@ const QUADRATURE: usize = 1 << 12;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LightsState {
-    method: MethodName,
+    method: String,
     /// Whether variance minimization gives up the rectangles of its cuts for cells that move.
     refine: bool,
     /// None leaves what is not of compact sources on the map.
     n: Option<usize>,
     sun: bool,
     lamps: usize,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum MethodName {
-    MedianCut,
-    VarianceMinimization,
-    /// The rule of Viriyothai & Debevec 2009.
-    #[serde(rename = "variance-minimization:2009")]
-    Poster,
 }
 
 /// A rig, for the page.
@@ -73,15 +63,14 @@ struct FormatReport {
     dome: Option<&'static str>,
 }
 
-fn method(name: &MethodName, refine: bool) -> Method {
-    let all = VarianceMinimization::default();
-    match name {
-        MethodName::MedianCut => Method::MedianCut(MedianCut::default()),
-        MethodName::Poster => Method::VarianceMinimization(VarianceMinimization::poster()),
-        MethodName::VarianceMinimization if refine => Method::VarianceMinimization(all),
-        MethodName::VarianceMinimization => {
-            Method::VarianceMinimization(VarianceMinimization { lloyd_steps: 0, ..all })
-        }
+impl LightsState {
+    fn method(&self) -> Result<Method, Error> {
+        Ok(match self.method.parse().map_err(refused)? {
+            Method::VarianceMinimization(settings) if !self.refine => {
+                Method::VarianceMinimization(VarianceMinimization { lloyd_steps: 0, ..settings })
+            }
+            method => method,
+        })
     }
 }
 
@@ -105,7 +94,7 @@ impl Engine {
                     sun: state.sun,
                     n_lamps: state.lamps,
                     n_lights: state.n,
-                    method: method(&state.method, state.refine),
+                    method: state.method()?,
                     min_share: None,
                 };
                 extract(self.environment()?, settings).map_err(error)?
@@ -131,19 +120,15 @@ impl Engine {
         };
         let orientation = environment.orientation();
         let to_map = orientation.map_to_world().transpose();
-        let export = RigExport { probe: "", orientation, lights: &rig.lights, dome: None };
-        let lights = rig.lights.iter().zip(export.names()).map(|(light, name)| LightReport {
-            name,
-            uv: Mapping::LatLong.uv(to_map * light.direction).to_array(),
-            irradiance: light.irradiance.to_array(),
-            share: light.share,
-            radius: light.angular_radius.to_degrees(),
-            kind: match light.region {
-                Region::Sun => "sun",
-                Region::Lamp => "lamp",
-                Region::Rectangle(_) | Region::Cell => "region",
-            },
-        });
+        let lights =
+            rig.lights.iter().zip(light_names(&rig.lights)).map(|(light, name)| LightReport {
+                name,
+                uv: Mapping::LatLong.uv(to_map * light.direction).to_array(),
+                irradiance: light.irradiance.to_array(),
+                share: light.share,
+                radius: light.angular_radius.to_degrees(),
+                kind: light.region.kind(),
+            });
         let formats = Format::ALL.map(|format| FormatReport {
             name: format.name(),
             extension: format.extensions()[0],

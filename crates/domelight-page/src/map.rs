@@ -219,6 +219,7 @@ impl Engine {
         let scene = self.scene()?;
         let view = scene.camera(camera, width as f32 / height.max(1) as f32);
         let camera = Camera::new(&view, width, height).map_err(error)?;
+        let camera = scene.scene.camera_inside(&camera);
         let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
         Ok(scene.scene.camera_hit(&ray, 0, 0).map(|hit| (ray, hit)))
     }

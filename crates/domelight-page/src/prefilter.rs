@@ -18,25 +18,10 @@ struct IblState {
     /// Empty for levels of linear roughness that are looked up with the world direction.
     engine: String,
     size: usize,
-    texels: TexelsName,
-    sun: SunName,
-    /// The most radiance where `sun` is clamped \[W·m⁻²·sr⁻¹\].
+    texels: String,
+    sun: String,
+    /// The most radiance where `sun` is "clamp" \[W·m⁻²·sr⁻¹\].
     clamp: f32,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum TexelsName {
-    Rgb9e5,
-    Half,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum SunName {
-    Keep,
-    Remove,
-    Clamp,
 }
 
 /// The textures of prefiltered light.
@@ -84,42 +69,34 @@ impl IblState {
         named.transpose().map_err(refused)
     }
 
-    fn treatment(&self) -> SunTreatment {
-        match self.sun {
-            SunName::Keep => SunTreatment::Keep,
-            SunName::Remove => SunTreatment::Remove,
-            SunName::Clamp => SunTreatment::Clamp(self.clamp),
+    fn treatment(&self) -> Result<SunTreatment, Error> {
+        match &self.sun[..] {
+            "clamp" => Ok(SunTreatment::Clamp(self.clamp)),
+            sun => sun.parse().map_err(refused),
         }
     }
 
-    fn format(&self) -> TexelFormat {
-        match self.texels {
-            TexelsName::Rgb9e5 => TexelFormat::SharedExponent,
-            TexelsName::Half => TexelFormat::Half,
-        }
+    fn format(&self) -> Result<TexelFormat, Error> {
+        self.texels.parse().map_err(refused)
     }
 }
 
 fn encoded(texture: &Texture, container: &str) -> Result<Vec<u8>, Error> {
-    let unknown = || refused(format!("there are no {container} files of textures"));
     let mut bytes = Vec::new();
-    let container = Container::of_extension(container).ok_or_else(unknown)?;
+    let container: Container = container.parse().map_err(refused)?;
     container.encode(texture, &mut bytes).map_err(refused)?;
     Ok(bytes)
 }
 
 impl Engine {
     /// The engines, the languages of shaders and the usual number of texels of tables, as JSON.
-    ///
-    /// # Errors
-    /// None.
-    pub fn targets(&self) -> Result<String, Error> {
+    pub fn targets(&self) -> String {
         let language = |l: ShaderLanguage| Language { name: l.name(), extension: l.extension() };
-        Ok(to_json(&Offers {
+        to_json(&Offers {
             engines: Target::ALL.map(Target::name).into(),
             languages: ShaderLanguage::ALL.map(language).into(),
             texels: TableSettings::default().texels,
-        }))
+        })
     }
 
     /// Prefilters the map: `{"engine", "size", "texels", "sun", "clamp"}`; it is kept until the map changes.
@@ -131,12 +108,12 @@ impl Engine {
             return Ok(report.clone());
         }
         let state: IblState = parse(json)?;
-        let treated = state.treatment().apply(self.environment()?).map_err(refused)?;
+        let treated = state.treatment()?.apply(self.environment()?).map_err(refused)?;
         let settings = IblSettings::for_engine(state.target()?, state.size);
         let light = prefilter(&treated.environment, &settings).map_err(refused)?;
-        let (radiance, clipped) = Texture::cube(&light.levels, state.format());
-        let (irradiance, _) =
-            Texture::cube(std::slice::from_ref(&light.irradiance), state.format());
+        let texels = state.format()?;
+        let (radiance, clipped) = Texture::cube(&light.levels, texels);
+        let (irradiance, _) = Texture::cube(std::slice::from_ref(&light.irradiance), texels);
         let report = IblReport {
             levels: light.levels.len(),
             clipped: clipped.texels,

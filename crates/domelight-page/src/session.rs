@@ -1,14 +1,11 @@
 //! A picture on its way: the progressive renderer over what the engine has loaded.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use domelight::environment::Environment;
 use domelight::render::{
-    Background, Counts, Filter, Observer, Passes, RenderSettings, Renderer, Window,
-    automatic_exposure,
+    Background, Deadline, Passes, RenderSettings, Renderer, Window, automatic_exposure,
 };
-use domelight::sampling::SamplerKind;
 use domelight::scene::Camera;
 use domelight::strategy::StrategySpec;
 use self_cell::self_cell;
@@ -95,23 +92,6 @@ pub struct Update {
     pub spent: bool,
 }
 
-/// Ends a run at a time, but not before it got any further.
-struct Deadline {
-    now: fn() -> f64,
-    end: f64,
-    advanced: AtomicBool,
-}
-
-impl Observer for Deadline {
-    fn tile_finished(&self, _: &Counts) {
-        self.advanced.store(true, Ordering::Relaxed);
-    }
-
-    fn canceled(&self) -> bool {
-        self.advanced.load(Ordering::Relaxed) && (self.now)() >= self.end
-    }
-}
-
 /// A renderer, and where it is to end.
 pub(crate) struct Rendering {
     session: Session,
@@ -160,7 +140,7 @@ impl Rendering {
 
     /// Renders until a time, or until a pass ends.
     fn advance(&mut self, end: f64, now: fn() -> f64) -> Update {
-        let deadline = Deadline { now, end, advanced: AtomicBool::new(false) };
+        let deadline = Deadline::new(now, end);
         self.session.with_dependent_mut(|_, renderer| {
             let before = renderer.mark();
             renderer.step_with(&deadline);
@@ -214,8 +194,6 @@ impl RenderState {
             n_samples: self.spp,
             seed: self.seed,
             passes: Passes::Doubling,
-            filter: Filter::default(),
-            sampler: SamplerKind::default(),
             background: if self.hide_environment { Background::Hidden } else { Background::Shown },
             ..RenderSettings::default()
         }

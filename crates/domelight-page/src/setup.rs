@@ -15,7 +15,7 @@ use domelight::math::Vec3;
 use domelight::picture::{memory_to_read, reduced_size};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
-    CameraSettings, EnvironmentSettings, EnvironmentSource, Framing, Layers, LoadOptions, Material,
+    CameraSettings, EnvironmentSettings, EnvironmentSource, Layers, LoadOptions, Material,
     MaterialModel, Projection, Scene, SceneDescription, load_bytes, load_with,
 };
 use domelight::{Rgb, RgbImage};
@@ -72,10 +72,6 @@ pub(crate) struct LoadedScene {
     pub(crate) scene: Scene,
     /// What the page hears of it.
     report: String,
-    up: UpAxis,
-    camera: Option<CameraSettings>,
-    /// What the scene was scaled by.
-    scale: f32,
 }
 
 /// A camera in JSON; one of `fov` and `ortho` is null.
@@ -116,14 +112,7 @@ impl CameraState {
 impl LoadedScene {
     /// The camera that was asked for, or else the scene's own, or one framed to it.
     pub(crate) fn camera(&self, asked: Option<CameraState>, aspect: f32) -> CameraSettings {
-        let own = asked.map(CameraState::settings).or(self.camera);
-        let Some(mut camera) = own else {
-            return self.scene.framed(&Framing::new(aspect, self.up.vector()));
-        };
-        if self.scale != 1.0 {
-            camera.scale(self.scale);
-        }
-        camera
+        asked.map_or_else(|| self.scene.camera(aspect), CameraState::settings)
     }
 }
 
@@ -318,7 +307,6 @@ impl Engine {
         if setup.ground {
             description.add_ground(up.vector());
         }
-        let camera = description.camera;
         let light = description.environment.take().map(|light| LightReport {
             probe: match light.source {
                 EnvironmentSource::Builtin(name) => name,
@@ -328,20 +316,16 @@ impl Engine {
             scale: light.scale,
             exposure: light.exposure,
         });
-        let mut view =
-            camera.unwrap_or_else(|| description.framed(&Framing::new(1.0, up.vector())));
-        let report_camera = CameraState::new(&view);
         let cameras = description.cameras.iter().enumerate().map(|(i, of_file)| CameraReport {
             name: if of_file.name.is_empty() { i.to_string() } else { of_file.name.clone() },
             camera: CameraState::new(&of_file.settings),
         });
         let cameras = cameras.collect();
-        let scale = description.rescale(&mut view);
         let scene = Scene::new(description).map_err(error)?;
         let report = SceneReport {
             triangles: scene.triangle_count(),
             warnings,
-            camera: report_camera,
+            camera: CameraState::new(&scene.camera(1.0)),
             cameras,
             materials,
             center: framed.center().to_array(),
@@ -349,7 +333,7 @@ impl Engine {
             up: up.vector().to_array(),
             environment: light,
         };
-        Ok(LoadedScene { scene, report: to_json(&report), up, camera, scale })
+        Ok(LoadedScene { scene, report: to_json(&report) })
     }
 
     /// Loads a probe: `{"probe", "rows", "reduce", "rotate", "scale", "exposure"}`; returns its size and what was repaired.
@@ -358,7 +342,7 @@ impl Engine {
     /// If there is no such probe or its file is damaged.
     pub fn load_environment(&mut self, json: &str) -> Result<String, Error> {
         let light: Light = parse(json)?;
-        let up = self.scene.as_ref().map_or(UpAxis::Y, |scene| scene.up);
+        let up = self.scene.as_ref().map_or(UpAxis::Y, |scene| scene.scene.up_axis());
         let loaded = self.kept_light(light.clone(), up, || self.read_light(&light, up))?;
         let report = loaded.report.clone();
         self.set_light(light, loaded);
@@ -427,10 +411,7 @@ impl Engine {
 
     /// The sizes, at most half the file's, at which its map can be read where it needs too much memory as a whole: JSON of
     /// `{"reduce", "size"}`, the largest first. None for other files.
-    ///
-    /// # Errors
-    /// None.
-    pub fn smaller_maps(&self, probe: &str) -> Result<String, Error> {
+    pub fn smaller_maps(&self, probe: &str) -> String {
         let bytes = self.bytes_of(Path::new(probe)).unwrap_or_default();
         let fits = |needed: u64| self.host.max_memory.is_none_or(|most| needed <= most);
         let is_too_large = memory_to_read(&bytes).is_ok_and(|needed| !fits(needed));
@@ -438,7 +419,7 @@ impl Engine {
             let ((width, height), needed) = reduced_size(&bytes, reduce).ok()?;
             (is_too_large && fits(needed)).then_some(SmallerMap { reduce, size: [width, height] })
         });
-        Ok(to_json(&sizes.collect::<Vec<_>>()))
+        to_json(&sizes.collect::<Vec<_>>())
     }
 
     /// Turns the environment \[degrees\]; the map is not read again.

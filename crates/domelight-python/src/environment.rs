@@ -23,19 +23,7 @@ use crate::picture::{depth, to_png, tone};
 
 /// Parses the name of an axis.
 pub(crate) fn up_axis(text: &str) -> PyResult<UpAxis> {
-    match text {
-        "y" => Ok(UpAxis::Y),
-        "z" => Ok(UpAxis::Z),
-        _ => Err(bad_value(format!("up is {text:?}; it must be 'y' or 'z'"))),
-    }
-}
-
-/// The name of an axis.
-pub(crate) fn up_name(up: UpAxis) -> &'static str {
-    match up {
-        UpAxis::Y => "y",
-        UpAxis::Z => "z",
-    }
+    text.parse().map_err(|_| bad_value(format!("up is {text:?}; it must be 'y' or 'z'")))
 }
 
 /// The radiance from every direction, with sampling in proportion to luminance.
@@ -73,14 +61,10 @@ impl Environment {
         settings: EnvironmentSettings,
     ) -> PyResult<Self> {
         let name = probe_name(&settings.source);
-        let made = abandonable(py, move || {
-            let kept = KeptWarnings::default();
-            let map = light.load(&settings, &kept)?;
-            let environment = settings.environment(map).at(probe_name(&settings.source))?;
-            Ok::<_, Error>((environment, kept.0.into_inner()))
-        });
-        let (environment, warnings) = made?.map_err(|e| from_source(&e))?;
-        warn(py, &warnings.unwrap_or_else(PoisonError::into_inner))?;
+        let environment = with_warnings(py, move |host| {
+            let map = light.load(&settings, host)?;
+            settings.environment(map).at(probe_name(&settings.source))
+        })?;
         Ok(Self { inner: Arc::new(environment), name })
     }
 
@@ -123,6 +107,20 @@ impl Host for KeptWarnings {
     fn warn(&self, text: &str) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(in_python(text));
     }
+}
+
+/// Runs a function of the laboratory without the interpreter, and issues its warnings.
+pub(crate) fn with_warnings<T: Send + 'static>(
+    py: Python<'_>,
+    f: impl FnOnce(&dyn Host) -> Result<T, Error> + Send + 'static,
+) -> PyResult<T> {
+    let made = abandonable(py, move || {
+        let kept = KeptWarnings::default();
+        Ok::<_, Error>((f(&kept)?, kept.0.into_inner()))
+    });
+    let (made, warnings) = made?.map_err(|e| from_source(&e))?;
+    warn(py, &warnings.unwrap_or_else(PoisonError::into_inner))?;
+    Ok(made)
 }
 
 #[pymethods]
@@ -290,7 +288,7 @@ impl Environment {
     /// str: the axis that the first row faces, 'y' or 'z'.
     #[getter]
     fn up(&self) -> &'static str {
-        up_name(self.inner.orientation().up)
+        self.inner.orientation().up.name()
     }
 
     /// str: the name of the environment.
@@ -503,7 +501,7 @@ impl Environment {
             self.name,
             map.width,
             map.height,
-            up_name(up)
+            up.name()
         )
     }
 
@@ -526,7 +524,7 @@ impl Environment {
         let restore = slf.get_type().getattr("_restore")?;
         let map = from_image(py, this.inner.map())?;
         let Orientation { up, rotation } = this.inner.orientation();
-        Ok((restore, (map, rotation, this.inner.unit(), up_name(up), this.name.clone())))
+        Ok((restore, (map, rotation, this.inner.unit(), up.name(), this.name.clone())))
     }
 
     #[classmethod]

@@ -38,16 +38,8 @@ fn cube<'py>(py: Python<'py>, cube: &Cube) -> PyResult<FloatArray<'py>> {
 
 impl PrefilteredLight {
     /// A sentence if a file lacks light.
-    fn loss(&self, clipped: ClippedLight, largest: f32) -> Option<String> {
-        (clipped.texels > 0).then(|| {
-            format!(
-                "{}: {} texels are brighter than {largest}, the most that the format holds, and are clipped: level 0 loses \
-                 {:.2} % of its light",
-                self.name,
-                clipped.texels,
-                100.0 * clipped.lost
-            )
-        })
+    fn loss(&self, clipped: ClippedLight) -> Option<String> {
+        clipped.warning().map(|text| format!("{}: {text}", self.name))
     }
 
     /// Writes the radiance, and says what the file lacks.
@@ -62,7 +54,7 @@ impl PrefilteredLight {
             return Err(bad_value(text));
         }
         write_atomically(path, |out| file.encode(&self.inner, out)).map_err(to_python)?;
-        Ok(self.loss(file.clipped(&self.inner), file.largest()))
+        Ok(self.loss(file.clipped(&self.inner)))
     }
 
     /// Writes a texture, and says what it lacks.
@@ -79,7 +71,7 @@ impl PrefilteredLight {
             "irradiance" => {
                 let (texture, clipped) =
                     Texture::cube(std::slice::from_ref(&self.inner.irradiance), texels);
-                (texture, self.loss(clipped, texels.largest()))
+                (texture, self.loss(clipped))
             }
             "brdf" => {
                 let table = BrdfTable::new(BrdfTable::SIZE, Engine::terms(self.engine));
@@ -101,14 +93,7 @@ fn extension(path: &Path) -> String {
 }
 
 fn texel_format(texels: &str) -> PyResult<TexelFormat> {
-    match texels {
-        "rgb9e5" => Ok(TexelFormat::SharedExponent),
-        "half" => Ok(TexelFormat::Half),
-        _ => {
-            let text = format!("texels is {texels:?}; it must be 'rgb9e5' or 'half'");
-            Err(bad_value(text))
-        }
-    }
+    texels.parse().map_err(|e| bad_value(format!("texels: {e}")))
 }
 
 #[pymethods]

@@ -11,8 +11,8 @@ use domelight::picture::tone::ToneMapping;
 use domelight::picture::write_atomically;
 use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
 use domelight::rig::{
-    self, Extraction, ExtractionSettings, MedianCut, Method, Region, RigLight, ShadingReference,
-    SphericalHarmonics, TexelRect, VarianceMinimization, extract,
+    self, Extraction, ExtractionSettings, Method, Region, RigLight, ShadingReference,
+    SphericalHarmonics, TexelRect, extract,
 };
 use domelight::{Rgb, RgbImage};
 use domelight_lab::names::file_name;
@@ -22,7 +22,7 @@ use pyo3::types::{PyBytes, PyType};
 
 use crate::arrays::{Floats, array, hashable, indices, rows};
 use crate::engine::{parallel, parallel_on};
-use crate::environment::{Environment, up_axis, up_name};
+use crate::environment::{Environment, up_axis};
 use crate::error::{bad_value, from_source, to_python};
 use crate::notebook::balls;
 use crate::picture::{Format as PictureFormat, depth, to_png, tone, write_image};
@@ -281,7 +281,7 @@ impl Rig {
             regions.collect(),
             this.labels(py)?,
             this.residual(),
-            (this.orientation.rotation, up_name(this.orientation.up)),
+            (this.orientation.rotation, this.orientation.up.name()),
             this.name.clone(),
         );
         Ok((slf.get_type().getattr("_restore")?, values))
@@ -391,18 +391,7 @@ pub(crate) fn lights(
 ) -> PyResult<Rig> {
     const MOST: usize = 1 << 20;
     let py = env.py();
-    let method = match method {
-        "variance-minimization" => Method::VarianceMinimization(VarianceMinimization::default()),
-        "variance-minimization:2009" => {
-            Method::VarianceMinimization(VarianceMinimization::poster())
-        }
-        "median-cut" => Method::MedianCut(MedianCut::default()),
-        _ => {
-            return Err(bad_value(format!(
-                "method is {method:?}; it must be 'variance-minimization', 'variance-minimization:2009' or 'median-cut'"
-            )));
-        }
-    };
+    let method: Method = method.parse().map_err(|e| bad_value(format!("method: {e}")))?;
     if let Some(n) = n.filter(|n| !(1..=MOST).contains(n)) {
         return Err(bad_value(format!("n is {n}; it must be from 1 to {MOST}, or None")));
     }

@@ -10,10 +10,10 @@ use domelight::geometry::{Aabb, Mesh};
 use domelight::math::{DVec3, Vec2, Vec3};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
-    self, AnimationTime, CameraSettings, EnvironmentSettings, Framing, LoadOptions, Material,
-    NamedCamera, Part, SceneDescription,
+    self, CameraSettings, EnvironmentSettings, Framing, Material, NamedCamera, Part,
+    SceneDescription,
 };
-use domelight_lab::job::{FilePart, Job, Light, Subject};
+use domelight_lab::job::{Job, Light, Subject};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict as _, PyDict, PyString, PyTuple, PyType};
@@ -22,8 +22,8 @@ use crate::arrays::{Floats, array, indices};
 use crate::bsdf::MaterialLike;
 use crate::camera::{self, CameraLike};
 use crate::engine::{abandonable, parallel};
-use crate::environment::{Environment, up_axis, up_name};
-use crate::error::{bad_value, from_source, to_python, warn};
+use crate::environment::{Environment, up_axis, with_warnings};
+use crate::error::{bad_value, from_source, to_python};
 use crate::lobe::PythonLobe;
 use crate::options;
 use crate::recipe::{self, Recipe};
@@ -179,13 +179,6 @@ impl Scene {
         let up = description.up.unwrap_or_default();
         changes.subject.apply(&mut description, up.vector());
         let subject = description.subject_bounds();
-        // Squares of lengths must be finite.
-        let extent = subject.size().max_element();
-        if extent > 1e18 || extent > 0.0 && extent < 1e-18 {
-            return Err(bad_value(format!(
-                "{name}: the scene is {extent:e} across; it must be from 1e-18 to 1e18"
-            )));
-        }
         let (camera, cameras) = (description.camera, description.cameras.clone());
         let offset = description.offset;
         let environment = description.environment.clone();
@@ -349,18 +342,14 @@ impl Scene {
         let keywords = recipe::keywords(py, options, given)?;
         let arguments = PyTuple::new(py, [path.as_os_str()])?;
         let recipe = Recipe::new(Some("load"), &arguments, &keywords);
-        let FilePart { scene, animation, at } = file;
-        let animation = animation.map(|name| AnimationTime { name, seconds: at.get() });
-        let options =
-            LoadOptions { strict: light.strict, scene, animation, ..LoadOptions::default() };
-        let loaded = parallel(py, || scene::load_with(&path, &options))?.map_err(to_python)?;
-        warn(py, &loaded.warnings)?;
-        let mut description = loaded.description;
+        let name = path.display().to_string();
+        let (mut description, _) =
+            with_warnings(py, move |host| file.load(&path, light.strict, host))?;
         if let Some(up) = up {
             description.up = Some(up_axis(up)?);
         }
         let changes = Changes { material, subject };
-        Self::build(py, path.display().to_string(), description, changes, recipe)
+        Self::build(py, name, description, changes, recipe)
     }
 
     /// Create a built-in scene: 'statue', 'spheres', 'material-ball', 'room', 'sphere' or 'sphere-orthographic'.
@@ -422,7 +411,7 @@ impl Scene {
     /// str: the axis that points up, 'y' or 'z'.
     #[getter]
     fn up(&self) -> &'static str {
-        up_name(self.inner.up)
+        self.inner.up.name()
     }
 
     /// list of str: the names of the file's cameras.

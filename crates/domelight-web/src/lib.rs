@@ -1,7 +1,7 @@
 //! The engine in a browser: an [`Engine`] a Worker, driven by the page in `web/`. It is that of `domelight-page`, bound to
 //! JavaScript.
 
-use domelight_page::{Host, MapView, for_each_call};
+use domelight_page::{Error, Host, MapView, for_each_call};
 use wasm_bindgen::prelude::*;
 
 /// The most that reading a scene or a map takes: an instance of WebAssembly has 4 GiB at the most, and builds a hierarchy
@@ -42,6 +42,14 @@ macro_rules! pass {
 
 pass!((), f32, Option<u32>, String, Vec<u8>, Vec<u32>, Vec<f32>);
 
+/// Errors are thrown.
+impl<T: ToJs> ToJs for Result<T, Error> {
+    type Js = Result<T::Js, JsError>;
+    fn to_js(self) -> Self::Js {
+        self.map(ToJs::to_js).map_err(thrown)
+    }
+}
+
 impl ToJs for MapView {
     type Js = MapPicture;
     fn to_js(self) -> MapPicture {
@@ -66,8 +74,8 @@ macro_rules! bind {
                 pub fn $method(
                     &mut self,
                     $($argument: $type),*
-                ) -> Result<<$result as ToJs>::Js, JsError> {
-                    self.0.$method($($argument),*).map(ToJs::to_js).map_err(thrown)
+                ) -> <$result as ToJs>::Js {
+                    self.0.$method($($argument),*).to_js()
                 }
             )*
         }
@@ -182,11 +190,8 @@ impl Update {
     }
 
     /// Counts over the whole render, as JSON.
-    ///
-    /// # Errors
-    /// None.
-    pub fn statistics(&self) -> Result<String, JsError> {
-        serde_json::to_string(&self.0.statistics).map_err(thrown)
+    pub fn statistics(&self) -> String {
+        serde_json::to_string(&self.0.statistics).unwrap_or_default()
     }
 }
 

@@ -73,6 +73,7 @@ mod color;
 pub mod environment;
 mod image;
 pub mod math;
+mod names;
 mod parallel;
 pub mod rig;
 pub mod sampling;

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::builder::TypedValueParser;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, TypedValueParser};
 use domelight::picture::texture::{Container, RadianceFile, TexelFormat};
 use domelight::rig::ibl::{Engine, IblSettings, SunTreatment};
 
@@ -65,32 +65,23 @@ pub(crate) struct IblArguments {
     )]
     pub(crate) sun: SunTreatment,
     /// Format of the texels in .ktx2 and .dds [default: rgb9e5]
-    #[arg(long, value_enum, help_heading = "Prefiltered light")]
-    pub(crate) texels: Option<Texels>,
+    #[arg(long, help_heading = "Prefiltered light", value_parser = texels())]
+    pub(crate) texels: Option<TexelFormat>,
 }
 
 fn engine() -> impl TypedValueParser<Value = Engine> {
     one_of(Engine::ALL.map(Engine::name))
 }
 
-/// The format of a cube's texels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Texels {
-    /// 4 bytes: mantissas of 9 bits with a common exponent, up to 65408
-    Rgb9e5,
-    /// 8 bytes: RGBA in half precision, up to 65504
-    Half,
-}
+const TEXELS: TexelFormat = TexelFormat::SharedExponent;
 
-const TEXELS: Texels = Texels::Rgb9e5;
-
-impl From<Texels> for TexelFormat {
-    fn from(texels: Texels) -> Self {
-        match texels {
-            Texels::Rgb9e5 => Self::SharedExponent,
-            Texels::Half => Self::Half,
-        }
-    }
+fn texels() -> impl TypedValueParser<Value = TexelFormat> {
+    let help = [
+        "4 bytes: mantissas of 9 bits with a common exponent, up to 65408",
+        "8 bytes: RGBA in half precision, up to 65504",
+    ];
+    let names = TexelFormat::CUBES.map(TexelFormat::name).into_iter();
+    one_of(names.zip(help).map(|(name, help)| PossibleValue::new(name).help(help)))
 }
 
 /// A texture file to write.
@@ -126,7 +117,7 @@ impl FromStr for IblPath {
         if text.ends_with(std::path::is_separator) || path.is_dir() {
             return Ok(Self::Folder(path));
         }
-        let format = extension(&path).and_then(|e| RadianceFile::of_extension(&e, TEXELS.into()));
+        let format = extension(&path).and_then(|e| RadianceFile::of_extension(&e, TEXELS));
         let known = "its name must end in .ktx2, .dds, .ktx or .env, or in / for a folder";
         format.map(|_| Self::File(path)).ok_or_else(|| known.into())
     }
@@ -139,7 +130,7 @@ fn extension(path: &Path) -> Option<Cow<'_, str>> {
 impl IblArguments {
     /// The format of the texels of cubes.
     pub(crate) fn texel_format(&self) -> TexelFormat {
-        self.texels.unwrap_or(TEXELS).into()
+        self.texels.unwrap_or(TEXELS)
     }
 
     /// The format of the radiance.

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::builder::TypedValueParser;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, TypedValueParser};
 use domelight::rig::export::Format;
-use domelight::rig::{MedianCut, Method, SphericalGaussians, VarianceMinimization};
+use domelight::rig::{Method, SphericalGaussians};
 
 use super::{one_of, percent};
 use crate::output::PicturePath;
@@ -52,9 +52,8 @@ pub(crate) struct LightsArguments {
           hide_default_value = true, value_parser = clap::value_parser!(u32).range(0..=4096))]
     pub(crate) lamps: u32,
     /// How to divide the remaining light
-    #[arg(long, value_enum, help_heading = "Lights",
-          default_value_t = MethodName::VarianceMinimization)]
-    pub(crate) method: MethodName,
+    #[arg(long, help_heading = "Lights", default_value = Method::NAMES[0], value_parser = method())]
+    pub(crate) method: Method,
     /// Leave lights with a smaller share of the probe's light in the map [%; default: 0.1 for sun and lamps]
     #[arg(long, value_name = "PERCENT", help_heading = "Lights", value_parser = percent)]
     pub(crate) min_energy: Option<f64>,
@@ -109,41 +108,17 @@ fn format() -> impl TypedValueParser<Value = Format> {
     one_of(Format::ALL.map(Format::name))
 }
 
-/// How to divide a map into regions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum MethodName {
-    /// Regions of small variance on the sphere: the sum of both halves' variances is minimized, the worst region is cut
-    /// first, and regions are then merged and refined into cells
-    VarianceMinimization,
-    /// The rule of the poster (Viriyothai & Debevec 2009): rectangles, cut level by level so that the larger of both
-    /// halves' variances on the map is least
-    #[value(name = "variance-minimization:2009")]
-    Poster,
-    /// Regions of equal energy (Debevec 2005)
-    MedianCut,
-}
-
-impl MethodName {
-    /// The name on the command line.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::VarianceMinimization => "variance-minimization",
-            Self::Poster => "variance-minimization:2009",
-            Self::MedianCut => "median-cut",
-        }
-    }
-}
-
-impl From<MethodName> for Method {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::VarianceMinimization => {
-                Self::VarianceMinimization(VarianceMinimization::default())
-            }
-            MethodName::Poster => Self::VarianceMinimization(VarianceMinimization::poster()),
-            MethodName::MedianCut => Self::MedianCut(MedianCut::default()),
-        }
-    }
+/// The algorithms that divide a map.
+fn method() -> impl TypedValueParser<Value = Method> {
+    let help = [
+        "Regions of small variance on the sphere: the sum of both halves' variances is minimized, the worst region is cut \
+         first, and regions are then merged and refined into cells",
+        "The rule of the poster (Viriyothai & Debevec 2009): rectangles, cut level by level so that the larger of both \
+         halves' variances on the map is least",
+        "Regions of equal energy (Debevec 2005)",
+    ];
+    let names = Method::NAMES.into_iter();
+    one_of(names.zip(help).map(|(name, help)| PossibleValue::new(name).help(help)))
 }
 
 /// The output file of a rig; `-` is standard output.

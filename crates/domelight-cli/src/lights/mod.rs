@@ -168,7 +168,7 @@ impl LightsArguments {
             sun: self.sun,
             n_lamps: self.lamps as usize,
             n_lights: self.has_regions().then(|| self.n_lights.map_or(N_LIGHTS, |n| n as usize)),
-            method: self.method.into(),
+            method: self.method,
             min_share: self.min_energy.map(|percent| (0.01 * percent) as f32),
         }
     }

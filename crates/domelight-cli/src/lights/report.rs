@@ -2,10 +2,8 @@
 
 use std::fmt::Write as _;
 
-use domelight::environment::Orientation;
 use domelight::math::Vec3;
-use domelight::rig::export::RigExport;
-use domelight::rig::{RigLight, ShadingError, SphericalHarmonics};
+use domelight::rig::{RigLight, ShadingError, SphericalHarmonics, light_names};
 use serde_json::{Value, json};
 
 use super::ExtractedRig;
@@ -35,9 +33,8 @@ impl LightsReport<'_> {
         &self.found.extraction.rig.lights
     }
 
-    fn names(&self) -> Vec<String> {
-        let orientation = Orientation::default();
-        RigExport { probe: self.probe, orientation, lights: self.lights(), dome: None }.names()
+    fn named_lights(&self) -> impl Iterator<Item = (&RigLight, String)> {
+        self.lights().iter().zip(light_names(self.lights()))
     }
 
     pub(super) fn table(&self) -> String {
@@ -45,7 +42,7 @@ impl LightsReport<'_> {
             "light       toward the light (x y z)       irradiance (r g b)                     \
              radius     share\n",
         );
-        for (light, name) in self.lights().iter().zip(self.names()) {
+        for (light, name) in self.named_lights() {
             let Vec3 { x, y, z } = light.direction;
             let irradiance = light.irradiance.to_array().map(|c| format!("{c:<11.5e}")).join(" ");
             let (radius, share) = (light.angular_radius.to_degrees(), 100.0 * light.share);
@@ -79,7 +76,7 @@ impl LightsReport<'_> {
     }
 
     pub(super) fn json(&self) -> Value {
-        let lights = self.lights().iter().zip(self.names()).map(|(light, name)| {
+        let lights = self.named_lights().map(|(light, name)| {
             json!({
                 "name": name,
                 "direction": light.direction.to_array(),

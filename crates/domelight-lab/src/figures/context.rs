@@ -141,7 +141,7 @@ impl<'a> FigureContext<'a> {
             _ => self.description.clone(),
         };
         let aspect = width as f32 / height as f32;
-        let mut view = if let Subject::Alone(material) = subject {
+        let view = if let Subject::Alone(material) = subject {
             let text = material;
             let bsdf: Bsdf = text.parse().at(format_args!("material {text}"))?;
             description.set_subject_material(bsdf);
@@ -150,7 +150,6 @@ impl<'a> FigureContext<'a> {
         } else {
             view_of(&description, aspect, self.up)
         };
-        description.rescale(&mut view);
         Ok(FigureScene {
             context: self,
             name: format!("{subject:?} {width}x{height}"),

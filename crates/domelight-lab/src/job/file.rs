@@ -52,6 +52,37 @@ impl FilePart {
             ))),
         }
     }
+
+    /// Reads this part of a file, with what will not be shown, one sentence per item, without folders.
+    ///
+    /// # Errors
+    /// If a file cannot be read, is damaged, or has no such part.
+    pub fn load(
+        &self,
+        path: &Path,
+        strict: bool,
+        host: &dyn Host,
+    ) -> Result<(SceneDescription, Vec<String>), Error> {
+        host.reads(path)?;
+        let animation = self.animation.clone();
+        let options = LoadOptions {
+            max_memory: host.memory_left(),
+            strict,
+            scene: self.scene.clone(),
+            animation: animation.map(|name| AnimationTime { name, seconds: self.at.get() }),
+            ..LoadOptions::default()
+        };
+        let loaded = load_with(path, &options)?;
+        loaded.files.iter().try_for_each(|file| host.reads(file))?;
+        host.keeps_memory(loaded.memory);
+        for warning in &loaded.warnings {
+            host.warn(warning);
+        }
+        let files = || loaded.files.iter().map(PathBuf::as_path).chain([path]);
+        let shared = |text: &String| without_folders(text, files());
+        let warnings = loaded.warnings.iter().map(shared).collect();
+        Ok((loaded.description, warnings))
+    }
 }
 
 /// A built-in scene by its name, or else a file, with what will not be shown, one sentence per item, without folders.
@@ -64,23 +95,5 @@ pub(crate) fn load_scene(
     if let Ok(builtin) = BuiltinScene::from_str(name) {
         return Ok((builtin.description(), Vec::new()));
     }
-    host.reads(Path::new(name))?;
-    let animation = part.animation.clone();
-    let options = LoadOptions {
-        max_memory: host.memory_left(),
-        strict,
-        scene: part.scene.clone(),
-        animation: animation.map(|name| AnimationTime { name, seconds: part.at.get() }),
-        ..LoadOptions::default()
-    };
-    let loaded = load_with(Path::new(name), &options)?;
-    loaded.files.iter().try_for_each(|file| host.reads(file))?;
-    host.keeps_memory(loaded.memory);
-    for warning in &loaded.warnings {
-        host.warn(warning);
-    }
-    let files = || loaded.files.iter().map(PathBuf::as_path).chain([Path::new(name)]);
-    let shared = |text: &String| without_folders(text, files());
-    let warnings = loaded.warnings.iter().map(shared).collect();
-    Ok((loaded.description, warnings))
+    part.load(Path::new(name), strict, host)
 }

@@ -440,14 +440,11 @@ impl<T: Named> ValueParserFactory for Choice<T> {
 
 impl Named for UpAxis {
     fn all() -> Vec<Self> {
-        vec![Self::Y, Self::Z]
+        Self::ALL.to_vec()
     }
 
     fn name(self) -> &'static str {
-        match self {
-            Self::Y => "y",
-            Self::Z => "z",
-        }
+        self.name()
     }
 
     fn help(self) -> &'static str {
@@ -514,45 +511,22 @@ impl Named for SamplerKind {
     }
 }
 
-impl Named for Filter {
-    fn all() -> Vec<Self> {
-        Self::ALL.to_vec()
-    }
+/// Types of the library whose names need no help.
+macro_rules! named {
+    ($($type:ty),*) => {
+        $(impl Named for $type {
+            fn all() -> Vec<Self> {
+                Self::ALL.to_vec()
+            }
 
-    fn name(self) -> &'static str {
-        self.name()
-    }
+            fn name(self) -> &'static str {
+                self.name()
+            }
+        })*
+    };
 }
 
-impl Named for Window {
-    fn all() -> Vec<Self> {
-        Self::ALL.to_vec()
-    }
-
-    fn name(self) -> &'static str {
-        self.name()
-    }
-}
-
-impl Named for Mapping {
-    fn all() -> Vec<Self> {
-        Self::ALL.to_vec()
-    }
-
-    fn name(self) -> &'static str {
-        self.name()
-    }
-}
-
-impl Named for Convention {
-    fn all() -> Vec<Self> {
-        Self::ALL.to_vec()
-    }
-
-    fn name(self) -> &'static str {
-        self.name()
-    }
-}
+named!(Filter, Window, Mapping, Convention);
 
 impl Named for ToneCurve {
     fn all() -> Vec<Self> {

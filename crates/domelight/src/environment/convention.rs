@@ -5,9 +5,9 @@
 //! usual way, as glTF or with its up axis kept, meets its map again by one turn about the up axis.
 
 use std::fmt;
-use std::str::FromStr;
 
 use crate::math::{TAU, functions};
+use crate::names::read_by_name;
 use crate::{Rgb, RgbImage};
 
 /// A program, and how it orients a lat-long map.
@@ -63,14 +63,6 @@ impl Proof {
     }
 }
 
-/// A name that is not in [`Convention::ALL`].
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no convention {name:?}")]
-pub struct UnknownConvention {
-    /// The given name.
-    pub name: String,
-}
-
 /// A map whose columns cannot be turned by a quarter without mixing them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -99,7 +91,7 @@ impl Convention {
         Self::Nvdiffrec,
     ];
 
-    /// The name that [`FromStr`] parses.
+    /// The name that [`FromStr`](std::str::FromStr) parses.
     pub fn name(self) -> &'static str {
         match self {
             Self::Blender => "blender",
@@ -245,14 +237,7 @@ fn mirrored(map: &RgbImage) -> RgbImage {
     RgbImage::from_fn(map.width, map.height, |x, y| map.get(map.width - 1 - x, y))
 }
 
-impl FromStr for Convention {
-    type Err = UnknownConvention;
-
-    fn from_str(name: &str) -> Result<Self, UnknownConvention> {
-        let found = Self::ALL.into_iter().find(|convention| convention.name() == name);
-        found.ok_or_else(|| UnknownConvention { name: name.to_owned() })
-    }
-}
+read_by_name!(Convention::ALL, UnknownConvention, "there is no convention");
 
 impl fmt::Display for Convention {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

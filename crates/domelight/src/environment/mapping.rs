@@ -26,7 +26,7 @@ pub use faces::{CubeFaces, UnknownFaces};
 pub use fisheye::Fisheye;
 
 use crate::math::{PI, TAU, Vec2, Vec3, functions, sqr, vec2, vec3};
-use std::str::FromStr;
+use crate::names::read_by_name;
 
 /// The value of the `envmap` attribute of an OpenEXR file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,14 +75,6 @@ pub struct ShapeError {
     pub height: usize,
 }
 
-/// No mapping has this name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown mapping {name:?}; known are {}", Mapping::ALL.map(Mapping::name).join(", "))]
-pub struct UnknownMapping {
-    /// The given name.
-    pub name: String,
-}
-
 impl Mapping {
     /// All mappings.
     pub const ALL: [Self; 9] = [
@@ -97,7 +89,7 @@ impl Mapping {
         Self::Octahedral,
     ];
 
-    /// The name that [`FromStr`] understands.
+    /// The name that [`FromStr`](std::str::FromStr) understands.
     pub const fn name(self) -> &'static str {
         match self {
             Self::LatLong => "lat-long",
@@ -273,14 +265,7 @@ impl std::fmt::Display for Mapping {
     }
 }
 
-impl FromStr for Mapping {
-    type Err = UnknownMapping;
-
-    fn from_str(name: &str) -> Result<Self, UnknownMapping> {
-        let found = Self::ALL.into_iter().find(|mapping| mapping.name() == name);
-        found.ok_or_else(|| UnknownMapping { name: name.to_owned() })
-    }
-}
+read_by_name!(Mapping::ALL, UnknownMapping, "unknown mapping");
 
 /// d = (sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π(u − ½), θ = π v.
 fn lat_long_direction(uv: Vec2) -> Vec3 {

@@ -33,9 +33,12 @@ use std::borrow::Cow;
 use crate::math::{
     Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, sin_cos_half_turns, vec2,
 };
+use crate::names::read_by_name;
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
 use crate::simd::{Colors, LANES, LaneMask as _, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
 use crate::{Rgb, RgbImage};
+
+read_by_name!(UpAxis::ALL, UnknownUpAxis, "there is no up axis");
 
 /// A world axis that points up; the top row of a map faces it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,6 +52,17 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
+    /// Both axes.
+    pub const ALL: [Self; 2] = [Self::Y, Self::Z];
+
+    /// The name that [`FromStr`](std::str::FromStr) reads.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Y => "y",
+            Self::Z => "z",
+        }
+    }
+
     /// The axis as a unit vector.
     pub fn vector(self) -> Vec3 {
         match self {

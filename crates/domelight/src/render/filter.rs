@@ -4,9 +4,8 @@
 //! splatted into a neighbor, so tiles are independent and pixels keep independent
 //! noise. This works only for filters without negative lobes.
 
-use std::str::FromStr;
-
 use crate::math::{Vec2, functions, vec2};
+use crate::names::read_by_name;
 use crate::sampling::Table1d;
 
 /// A reconstruction filter, separable, centered on the pixel.
@@ -65,18 +64,7 @@ impl Filter {
     }
 }
 
-/// The name of an unknown filter.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no filter '{0}'; the filters are box, tent, gaussian and blackman-harris")]
-pub struct UnknownFilter(pub String);
-
-impl FromStr for Filter {
-    type Err = UnknownFilter;
-
-    fn from_str(s: &str) -> Result<Self, UnknownFilter> {
-        Self::ALL.into_iter().find(|f| f.name() == s).ok_or_else(|| UnknownFilter(s.to_owned()))
-    }
-}
+read_by_name!(Filter::ALL, UnknownFilter, "there is no filter");
 
 /// Samples positions with the density of a filter.
 #[derive(Clone, Debug)]

@@ -215,6 +215,31 @@ pub trait Observer: Sync {
 /// An observer that does nothing.
 impl Observer for () {}
 
+/// An observer that ends a step at a time, but not before a tile is done.
+#[derive(Debug)]
+pub struct Deadline {
+    now: fn() -> f64,
+    end: f64,
+    has_advanced: AtomicBool,
+}
+
+impl Deadline {
+    /// Ends at `end` on the clock `now`, in its unit.
+    pub const fn new(now: fn() -> f64, end: f64) -> Self {
+        Self { now, end, has_advanced: AtomicBool::new(false) }
+    }
+}
+
+impl Observer for Deadline {
+    fn tile_finished(&self, _: &Counts) {
+        self.has_advanced.store(true, Ordering::Relaxed);
+    }
+
+    fn canceled(&self) -> bool {
+        self.has_advanced.load(Ordering::Relaxed) && (self.now)() >= self.end
+    }
+}
+
 /// An observer that ends the render when the flag is raised.
 impl Observer for AtomicBool {
     fn canceled(&self) -> bool {

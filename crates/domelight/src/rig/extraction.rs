@@ -6,6 +6,8 @@
 //! by channel: the light taken from a texel is the difference of two single-precision numbers, summed in
 //! double precision.
 
+use std::str::FromStr;
+
 use super::median_cut::{MedianCut, median_cut};
 use super::texels::Texels;
 use super::variance_minimization::{VarianceMinimization, variance_minimization};
@@ -30,6 +32,21 @@ impl Default for Method {
 }
 
 impl Method {
+    /// The names that [`FromStr`] reads; the first is the default.
+    pub const NAMES: [&'static str; 3] =
+        ["variance-minimization", "variance-minimization:2009", "median-cut"];
+
+    /// The name of a method with its usual settings.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::VarianceMinimization(settings) if settings == VarianceMinimization::poster() => {
+                Self::NAMES[1]
+            }
+            Self::VarianceMinimization(_) => Self::NAMES[0],
+            Self::MedianCut(_) => Self::NAMES[2],
+        }
+    }
+
     /// Divides all of the environment's light into `n_lights` lights.
     ///
     /// # Errors
@@ -41,6 +58,28 @@ impl Method {
                 variance_minimization(environment, n_lights, settings)
             }
         }
+    }
+}
+
+/// A name that is not in [`Method::NAMES`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no method {name:?}; known are {}", Method::NAMES.join(", "))]
+pub struct UnknownMethod {
+    /// The given name.
+    pub name: String,
+}
+
+impl FromStr for Method {
+    type Err = UnknownMethod;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
+        let usual = [
+            Self::default(),
+            Self::VarianceMinimization(VarianceMinimization::poster()),
+            Self::MedianCut(MedianCut::default()),
+        ];
+        let found = usual.into_iter().find(|method| method.name() == name);
+        found.ok_or_else(|| UnknownMethod { name: name.to_owned() })
     }
 }
 

@@ -45,25 +45,6 @@ impl SceneDescription {
         framing.fit(framed_points(&self.parts, &is_subject, copies))
     }
 
-    /// Scales a very small or very large scene to a moderate size, together with `view` and the scene's own camera.
-    /// Returns the factor, a power of two, which is 1 for scenes from 1/16 to 65536. The picture stays the same,
-    /// because the light is infinitely far away. The distance that rays keep from surfaces is chosen for moderate
-    /// sizes.
-    ///
-    /// [`Scene::new`](super::Scene::new) scales the meshes of other scenes automatically, and takes a camera in the
-    /// units of the description.
-    pub fn rescale(&mut self, view: &mut CameraSettings) -> f32 {
-        let factor = usual_scale(&self.bounds());
-        if factor != 1.0 {
-            self.parts.iter_mut().for_each(|part| part.mesh.scale(factor));
-            let translations = self.instances.iter_mut().map(|i| &mut i.transform.w_axis);
-            translations.for_each(|t| *t = (factor * t.truncate()).extend(t.w));
-            self.offset *= f64::from(factor);
-            self.camera.iter_mut().chain([view]).for_each(|camera| camera.scale(factor));
-        }
-        factor
-    }
-
     /// Moves the center of the subject's bounds to the origin and scales its longest half-extent
     /// to 1. Everything else is transformed with it.
     pub fn normalize(&mut self) {
@@ -210,23 +191,24 @@ mod tests {
         assert!((bounds.size().max_element() - 2.0).abs() < 1e-5);
     }
 
+    /// The factor that makes a scene's size usual, and the farthest coordinate then.
+    fn scaled(scene: &SceneDescription) -> (f32, f32) {
+        let bounds = scene.bounds();
+        let scale = usual_scale(&bounds);
+        assert_eq!(power_of_two(scale), scale, "no digit is lost");
+        (scale, scale * bounds.min.abs().max(bounds.max.abs()).max_element())
+    }
+
     #[test]
     fn unusual_sizes_become_usual_without_a_lost_digit() {
         for factor in [1e-18, 1e-9, 1e-3, 1.0, 100.0, 1e5, 1e10, 1e18] {
             let mut scene = ball();
-            let factor = power_of_two(factor);
-            scene.parts[0].mesh.scale(factor);
-            let mut view = CameraSettings::framing(&scene.bounds(), 1.0, Vec3::Y);
-            let (old, old_view) = (scene.clone(), view);
-            let undo = scene.rescale(&mut view);
-            assert_eq!(usual_scale(&scene.bounds()), 1.0);
+            scene.parts[0].mesh.scale(power_of_two(factor));
             let size = scene.bounds().size().max_element();
-            assert!((USUAL[0]..=USUAL[1]).contains(&size), "{factor:e}: {size}");
-            let old_size = old.bounds().size().max_element();
-            assert_eq!(undo == 1.0, (USUAL[0]..=USUAL[1]).contains(&old_size));
-            assert_eq!((view.origin / undo, view.up), (old_view.origin, old_view.up));
-            let (new, old) = (&scene.parts[0].mesh, &old.parts[0].mesh);
-            assert!(new.positions.iter().zip(&old.positions).all(|(new, old)| new / undo == *old));
+            let (scale, farthest) = scaled(&scene);
+            assert_eq!(scale == 1.0, (USUAL[0]..=USUAL[1]).contains(&size), "{factor:e}");
+            assert!((USUAL[0]..=USUAL[1]).contains(&(scale * size)), "{factor:e}: {size}");
+            assert!(farthest <= USUAL[1], "{factor:e}");
         }
     }
 
@@ -238,10 +220,8 @@ mod tests {
             let m = Mat4::from_translation(vec3(distance, 0.0, 0.0))
                 * Mat4::from_scale(Vec3::splat(size));
             scene.parts[0].mesh.transform(&m);
-            let mut view = CameraSettings::framing(&scene.bounds(), 1.0, Vec3::Y);
-            scene.rescale(&mut view);
-            assert_eq!(usual_scale(&scene.bounds()), 1.0, "{size:e} at {distance}");
-            assert!(scene.bounds().max.max_element() <= USUAL[1], "{size:e} at {distance}");
+            let (_, farthest) = scaled(&scene);
+            assert!(farthest <= USUAL[1], "{size:e} at {distance}");
         }
     }
 

@@ -13,11 +13,11 @@ mod studio;
 
 use std::f64::consts::{PI, TAU};
 use std::fmt;
-use std::str::FromStr;
 
 use crate::color::Rgb;
 use crate::image::RgbImage;
 use crate::math::{Vec3, functions, vec3};
+use crate::names::read_by_name;
 
 /// A procedural light probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -33,19 +33,11 @@ pub enum BuiltinProbe {
     Constant,
 }
 
-/// The name of an unknown built-in probe.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no built-in probe {name:?}; the probes are sky, studio, cathedral and constant")]
-pub struct UnknownProbe {
-    /// The name that was given.
-    pub name: String,
-}
-
 impl BuiltinProbe {
     /// All built-in probes, in the order of their documentation.
     pub const ALL: [Self; 4] = [Self::Sky, Self::Studio, Self::Cathedral, Self::Constant];
 
-    /// The name that [`FromStr`] reads.
+    /// The name that [`FromStr`](std::str::FromStr) reads.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Sky => "sky",
@@ -94,16 +86,7 @@ impl fmt::Display for BuiltinProbe {
     }
 }
 
-impl FromStr for BuiltinProbe {
-    type Err = UnknownProbe;
-
-    fn from_str(name: &str) -> Result<Self, UnknownProbe> {
-        Self::ALL
-            .into_iter()
-            .find(|p| p.name() == name)
-            .ok_or_else(|| UnknownProbe { name: name.to_owned() })
-    }
-}
+read_by_name!(BuiltinProbe::ALL, UnknownProbe, "there is no built-in probe");
 
 /// The map whose texels are the solid-angle means of `radiance`, taken on a grid of at least
 /// `fine_rows` rows over the sphere.

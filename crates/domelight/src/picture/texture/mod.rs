@@ -26,6 +26,7 @@ use half::f16;
 
 use crate::Rgb;
 use crate::math::functions;
+use crate::names::read_by_name;
 use crate::rig::ibl::{BrdfTable, Cube};
 use crate::rig::tables::ShaderTables;
 
@@ -43,8 +44,21 @@ pub enum TexelFormat {
 }
 
 impl TexelFormat {
+    /// Those in which cubes are written.
+    pub const CUBES: [Self; 2] = [Self::SharedExponent, Self::Half];
+
     /// Those of radiance.
     const RADIANCE: [Self; 3] = [Self::SharedExponent, Self::Half, Self::Single];
+
+    /// The name that [`FromStr`](std::str::FromStr) reads.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SharedExponent => "rgb9e5",
+            Self::Half => "half",
+            Self::HalfPair => "half-pair",
+            Self::Single => "single",
+        }
+    }
 
     /// The size of a texel in bytes.
     pub const fn bytes(self) -> usize {
@@ -65,6 +79,8 @@ impl TexelFormat {
     }
 }
 
+read_by_name!(TexelFormat::CUBES, UnknownTexelFormat, "there is no format of texels");
+
 /// A file format of textures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Container {
@@ -75,13 +91,20 @@ pub enum Container {
 }
 
 impl Container {
+    /// Both formats.
+    pub const ALL: [Self; 2] = [Self::Ktx2, Self::Dds];
+
+    /// The extension of its files, which is also the name that [`FromStr`](std::str::FromStr) reads.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ktx2 => "ktx2",
+            Self::Dds => "dds",
+        }
+    }
+
     /// The format whose files have this extension, in any case.
     pub fn of_extension(extension: &str) -> Option<Self> {
-        match extension.to_ascii_lowercase().as_str() {
-            "ktx2" => Some(Self::Ktx2),
-            "dds" => Some(Self::Dds),
-            _ => None,
-        }
+        extension.to_ascii_lowercase().parse().ok()
     }
 
     /// Writes a texture. Every texture of at least one level can be written.
@@ -95,6 +118,8 @@ impl Container {
         }
     }
 }
+
+read_by_name!(Container::ALL, UnknownContainer, "there is no file format of textures");
 
 /// A texture, or a cube of six squares.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,6 +141,8 @@ pub struct ClippedLight {
     pub texels: usize,
     /// The share of the light of level 0 that is lost, in \[0, 1\].
     pub lost: f64,
+    /// The largest value of a channel in the format.
+    pub largest: f32,
 }
 
 impl Texture {
@@ -151,12 +178,24 @@ impl Texture {
 }
 
 impl ClippedLight {
+    /// What a file lacks, as the rest of a sentence about a map; `None` if it lacks nothing.
+    pub fn warning(&self) -> Option<String> {
+        let Self { texels, lost, largest } = *self;
+        (texels > 0).then(|| {
+            format!(
+                "{texels} texels are brighter than {largest}, the most that the format holds, and are clipped: level 0 \
+                 loses {:.2} % of its light; rougher levels are filtered before that",
+                100.0 * lost
+            )
+        })
+    }
+
     /// What a format clips whose channels are at most `largest`.
     fn of(levels: &[Cube], largest: f32) -> Self {
         let is_clipped = |texel: &&Rgb| texel.max_component() > largest;
         let texels = levels.iter().flat_map(|cube| &cube.texels).filter(is_clipped).count();
         let lost = levels.first().map_or(0.0, |cube| lost_light(cube, largest));
-        Self { texels, lost }
+        Self { texels, lost, largest }
     }
 }
 

@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use super::RigExport;
-use crate::environment::UpAxis;
 use crate::rig::RigLight;
 
 /// The version of the format; it grows when a reader of an older version would be wrong.
@@ -48,10 +47,7 @@ pub(super) fn encode(rig: &RigExport) -> String {
         version: VERSION,
         probe: rig.probe,
         orientation: Orientation {
-            up: match rig.orientation.up {
-                UpAxis::Y => "y",
-                UpAxis::Z => "z",
-            },
+            up: rig.orientation.up.name(),
             rotation: rig.orientation.rotation,
         },
         lights: rig.lights.iter().zip(rig.names()).map(|(l, name)| Light::new(l, name)).collect(),

@@ -27,11 +27,10 @@ mod usd;
 
 pub use json::VERSION as JSON_VERSION;
 
-use std::str::FromStr;
-
 use super::{RigLight, SphericalHarmonics, light_names};
 use crate::environment::mapping::Mapping;
 use crate::environment::{Environment, Orientation};
+use crate::names::read_by_name;
 
 /// The content that all formats write.
 #[derive(Clone, Copy, Debug)]
@@ -152,13 +151,6 @@ pub enum ExportError {
         /// The name.
         file: String,
     },
-}
-
-/// No format has this name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{name}' is not a light rig format: {}", Format::ALL.map(Format::name).join(", "))]
-pub struct UnknownFormat {
-    name: String,
 }
 
 impl Format {
@@ -323,14 +315,7 @@ impl std::fmt::Display for Format {
     }
 }
 
-impl FromStr for Format {
-    type Err = UnknownFormat;
-
-    fn from_str(name: &str) -> Result<Self, UnknownFormat> {
-        let found = Self::ALL.into_iter().find(|format| format.name() == name);
-        found.ok_or_else(|| UnknownFormat { name: name.to_owned() })
-    }
-}
+read_by_name!(Format::ALL, UnknownFormat, "unknown format of rigs");
 
 /// A rig for the tests of formats.
 #[cfg(test)]

@@ -2,11 +2,10 @@
 //!
 //! Read in the engines' sources; docs/ibl.md says what of it was proved.
 
-use std::str::FromStr;
-
 use super::brdf::TableTerms;
 use super::cube::CubeAxes;
 use crate::math::{Vec3, functions};
+use crate::names::read_by_name;
 
 /// An engine that prefiltered light is made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,22 +121,7 @@ impl Engine {
     }
 }
 
-/// No engine has this name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown engine {name:?}; known are {}", Engine::ALL.map(Engine::name).join(", "))]
-pub struct UnknownEngine {
-    /// The given name.
-    pub name: String,
-}
-
-impl FromStr for Engine {
-    type Err = UnknownEngine;
-
-    fn from_str(name: &str) -> Result<Self, UnknownEngine> {
-        let found = Self::ALL.into_iter().find(|engine| engine.name() == name);
-        found.ok_or_else(|| UnknownEngine { name: name.to_owned() })
-    }
-}
+read_by_name!(Engine::ALL, UnknownEngine, "unknown engine");
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,6 @@
 //! Tables in the languages of shaders.
 
-use std::str::FromStr;
+use crate::names::read_by_name;
 
 /// A language of shaders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -17,14 +17,6 @@ pub enum ShaderLanguage {
     Cuda,
     /// The Metal shading language.
     Metal,
-}
-
-/// No language has this name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown language {name:?}; known are {}", ShaderLanguage::ALL.map(ShaderLanguage::name).join(", "))]
-pub struct UnknownLanguage {
-    /// The given name.
-    pub name: String,
 }
 
 /// The words of a language that looks like C.
@@ -167,14 +159,7 @@ impl ShaderLanguage {
     }
 }
 
-impl FromStr for ShaderLanguage {
-    type Err = UnknownLanguage;
-
-    fn from_str(name: &str) -> Result<Self, UnknownLanguage> {
-        let found = Self::ALL.into_iter().find(|language| language.name() == name);
-        found.ok_or_else(|| UnknownLanguage { name: name.to_owned() })
-    }
-}
+read_by_name!(ShaderLanguage::ALL, UnknownLanguage, "unknown language");
 
 #[cfg(test)]
 mod tests {

@@ -10,7 +10,6 @@ pub(crate) mod statue;
 mod surface_nets;
 
 use std::fmt;
-use std::str::FromStr;
 
 use super::camera::{CameraSettings, Projection};
 use super::framing::ViewDirection;
@@ -19,6 +18,7 @@ use super::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription, UpAx
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Mat4, Vec3, vec3};
+use crate::names::read_by_name;
 
 /// Spheres in the row.
 const SPHERES: usize = 7;
@@ -53,17 +53,6 @@ pub enum BuiltinScene {
     SphereOrthographic,
 }
 
-/// A name that is no built-in scene.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "there is no built-in scene {name:?}; the scenes are statue, spheres, material-ball, room, sphere \
-     and sphere-orthographic"
-)]
-pub struct UnknownScene {
-    /// The name that was given.
-    pub name: String,
-}
-
 impl BuiltinScene {
     /// All built-in scenes, in the order of their documentation.
     pub const ALL: [Self; 6] = [
@@ -75,7 +64,7 @@ impl BuiltinScene {
         Self::SphereOrthographic,
     ];
 
-    /// The name that [`FromStr`] reads.
+    /// The name that [`FromStr`](std::str::FromStr) reads.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Statue => "statue",
@@ -153,14 +142,7 @@ impl fmt::Display for BuiltinScene {
     }
 }
 
-impl FromStr for BuiltinScene {
-    type Err = UnknownScene;
-
-    fn from_str(name: &str) -> Result<Self, UnknownScene> {
-        let found = Self::ALL.into_iter().find(|s| s.name() == name);
-        found.ok_or_else(|| UnknownScene { name: name.to_owned() })
-    }
-}
+read_by_name!(BuiltinScene::ALL, UnknownScene, "there is no built-in scene");
 
 fn statue_scene() -> SceneDescription {
     let mut figure = statue::figure();
