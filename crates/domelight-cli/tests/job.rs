@@ -4,6 +4,7 @@ use crate::common;
 
 use common::{domelight, done, ended, json, load, stderr, write_exr};
 use domelight::picture::exr::text_attributes;
+use domelight::strategy::StrategyKind;
 use domelight::{Rgb, RgbImage};
 use std::fs;
 use tempfile::TempDir;
@@ -22,7 +23,7 @@ fn pixels(folder: &TempDir, name: &str) -> Vec<Rgb> {
 #[test]
 fn a_picture_is_rendered_again_by_every_strategy() {
     let folder = folder();
-    for strategy in [
+    let strategies = [
         "product:4",
         "mis:3:1:heuristic=balance",
         "brdf",
@@ -32,7 +33,13 @@ fn a_picture_is_rendered_again_by_every_strategy() {
         "sir:2/20:resampling=reservoir",
         "median-cut:5",
         "variance-minimization:7",
-    ] {
+    ];
+    for kind in StrategyKind::ALL {
+        let name = kind.declaration().name;
+        let is_it = |text: &str| text.split(':').next() == Some(name);
+        assert!(strategies.into_iter().any(is_it), "{name}");
+    }
+    for strategy in strategies {
         let scene = ["render", "spheres", "--strategy", strategy, "--seed", "5", "-q"];
         let how = ["--env", "studio", "--env-rotate", "30", "--ground", "--filter", "tent"];
         done(&domelight(&folder, &[&scene[..], &how, &SMALL, &["-o", "a.exr"]].concat()));
