@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use crate::error::refused;
+use crate::session::MAX_SIZE;
 use crate::{Engine, Error, MapView};
 
 /// Passes the list of the calls that the page makes to a macro: the name in JavaScript, and the method of
@@ -84,9 +85,6 @@ pub enum Answer {
     Map(MapView),
 }
 
-/// Sizes in messages are not larger, so that no picture takes more memory than there is.
-const MAX_SIZE: u64 = 1 << 13;
-
 /// An argument as a method takes it; `None` for another kind.
 trait FromArgument<'a>: Sized {
     fn from_argument(argument: &'a mut Argument) -> Option<Self>;
@@ -108,7 +106,8 @@ from_plain! {
     bool: value => value.as_bool();
     i32: value => value.as_i64()?.try_into().ok();
     u32: value => value.as_u64()?.try_into().ok();
-    usize: value => value.as_u64().filter(|&size| size <= MAX_SIZE).map(|size| size as usize);
+    // Not larger, so that no picture takes more memory than there is.
+    usize: value => value.as_u64()?.try_into().ok().filter(|&size| size <= MAX_SIZE);
     // JSON has null for NaN.
     f32: value => if value.is_null() { Some(f32::NAN) } else { Some(value.as_f64()? as f32) };
 }

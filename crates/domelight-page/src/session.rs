@@ -19,7 +19,7 @@ use crate::{Engine, Error};
 const VARIANCE_PAUSE: f64 = 30.0;
 
 /// Pixels along an edge of a picture at the most, far above what the page offers.
-const MAX_SIZE: usize = 1 << 13;
+pub(crate) const MAX_SIZE: usize = 1 << 13;
 
 /// What a renderer borrows.
 pub(crate) struct Borrowed {

@@ -308,3 +308,20 @@ fn compact_light(texels: &Texels, source: &CompactSource) -> RigLight {
     let region = if source.is_sun { Region::Sun } else { Region::Lamp };
     sums.light(texels, texels.environment().power(), region)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn methods_are_read_by_their_names() {
+        let read = |name: &str| name.parse::<Method>().map(Method::name);
+        assert!(Method::NAMES.into_iter().all(|name| read(name) == Ok(name)));
+        assert_eq!(Method::default().name(), Method::NAMES[0]);
+        let error = read("k-means").unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "there is no method \"k-means\"; known are variance-minimization, variance-minimization:2009, median-cut"
+        );
+    }
+}

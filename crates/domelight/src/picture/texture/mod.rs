@@ -267,6 +267,18 @@ mod tests {
     }
 
     #[test]
+    fn formats_are_read_by_their_names() {
+        for format in TexelFormat::CUBES {
+            assert_eq!(format.name().parse(), Ok(format));
+        }
+        for container in Container::ALL {
+            assert_eq!(Container::of_extension(&container.name().to_uppercase()), Some(container));
+        }
+        let error = "single".parse::<TexelFormat>().unwrap_err().to_string();
+        assert_eq!(error, "there is no format of texels \"single\"; known are rgb9e5, half");
+    }
+
+    #[test]
     fn shared_exponents_round_to_nearest() {
         for i in 0..20_000u32 {
             let c = |k: u32| {
