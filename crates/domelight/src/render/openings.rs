@@ -6,8 +6,8 @@
 //! 1. Send rays from the points of a pilot in cosine-weighted directions. If many are free, the scene is no room.
 //! 2. Take the orientations of most surfaces that block rays as those of possible planes, and where they lie as offsets.
 //! 3. Of each orientation, choose the plane in which free rays are most concentrated: by the number of pairs of rays from
-//!    different places that pass the same patch. Move it while the concentration grows, and onto a wall nearby. Grow the
-//!    densest patch to its neighbors, and put a rectangle around the rays there.
+//!    different places that pass the same patch. Move it while the concentration grows. There and in the planes of walls
+//!    nearby, grow the densest patch to its neighbors, and put a rectangle around the rays.
 //! 4. Of these rectangles, choose the one that the most free rays pass, times the part of all rays through it that are
 //!    free. It is a portal if that part is large and the rays come from several places.
 //! 5. Leave its rays out, and go on with step 3 until almost all free rays are explained.
@@ -265,19 +265,26 @@ impl<'a> Search<'a> {
     fn widest(&self, beams: &[usize]) -> Option<Opening> {
         let choosing: Vec<usize> =
             beams.iter().copied().step_by(beams.len().div_ceil(CHOOSING)).collect();
+        let worth = |opening: &Opening| opening.through.len() as f64 * opening.part_free;
+        let better = |a: Opening, b: Opening| if worth(&b) > worth(&a) { b } else { a };
         let of_orientation = |orientation: &Orientation| {
-            let rectangle = self.grown(self.densest(orientation, &choosing)?, beams)?;
-            let through = beams.iter().copied();
-            let through: Vec<usize> =
-                through.filter(|&i| rectangle.is_passed(&self.beams[i], self.extent)).collect();
-            let all = self.beams.iter().filter(|beam| rectangle.is_passed(beam, self.extent));
-            let n_all = all.clone().count();
-            let part_free = all.filter(|beam| beam.is_free).count() as f64 / n_all.max(1) as f64;
-            Some(Opening { rectangle, through, part_free })
+            let plane = self.densest(orientation, &choosing)?;
+            let planes = std::iter::once(plane).chain(orientation.near(plane, self.extent));
+            planes.filter_map(|plane| self.opening(plane, beams)).reduce(better)
         };
         let of_each: Vec<_> = self.orientations.par_iter().map(of_orientation).collect();
-        let worth = |opening: &Opening| opening.through.len() as f64 * opening.part_free;
-        of_each.into_iter().flatten().reduce(|a, b| if worth(&b) > worth(&a) { b } else { a })
+        of_each.into_iter().flatten().reduce(better)
+    }
+
+    /// The densest opening in a plane.
+    fn opening(&self, plane: Plane, beams: &[usize]) -> Option<Opening> {
+        let rectangle = self.grown(plane, beams)?;
+        let is_passed = |beam: &&Beam| rectangle.is_passed(beam, self.extent);
+        let through = beams.iter().copied().filter(|&i| is_passed(&&self.beams[i])).collect();
+        let all: Vec<&Beam> = self.beams.iter().filter(is_passed).collect();
+        let n_free = all.iter().filter(|beam| beam.is_free).count();
+        let part_free = n_free as f64 / all.len().max(1) as f64;
+        Some(Opening { rectangle, through, part_free })
     }
 
     /// Whether rays from several places pass an opening, and not too many others.
@@ -288,14 +295,14 @@ impl<'a> Search<'a> {
 
     /// The plane of an orientation in which these rays are most concentrated.
     fn densest(&self, orientation: &Orientation, beams: &[usize]) -> Option<Plane> {
-        let &Orientation { normal, axes, ref walls, .. } = orientation;
+        let &Orientation { normal, axes, .. } = orientation;
         let of_plane = |offset: f32| {
             let plane = Plane { normal, axes, offset };
             (self.meetings(&plane, beams, PATCH), plane)
         };
         let (meetings, plane) =
             orientation.offsets().map(of_plane).reduce(|a, b| if b.0 > a.0 { b } else { a })?;
-        (meetings > 0).then(|| snapped(self.refined(plane, beams), walls, self.extent))
+        (meetings > 0).then(|| self.refined(plane, beams))
     }
 
     /// The number of ordered pairs of rays from different places that pass the same patch of a plane.
@@ -388,17 +395,14 @@ impl Orientation {
         let regular = (0..OFFSETS).map(move |i| low - margin + i as f32 * step);
         self.walls.iter().copied().chain(regular)
     }
-}
 
-/// The plane of a wall near by, otherwise the plane itself: most windows lie in a wall.
-fn snapped(plane: Plane, walls: &[f32], extent: f32) -> Plane {
-    /// As a fraction of the extent.
-    const NEAR: f32 = 0.03;
-    let distance = |wall: &f32| (wall - plane.offset).abs();
-    let nearest = walls.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-    match nearest.filter(|wall| distance(wall) < NEAR * extent) {
-        Some(offset) => Plane { offset, ..plane },
-        None => plane,
+    /// The planes of walls near a plane: most windows lie in a wall.
+    fn near(&self, plane: Plane, extent: f32) -> impl Iterator<Item = Plane> {
+        /// As a fraction of the extent.
+        const NEAR: f32 = 0.06;
+        let walls = self.walls.iter().copied();
+        let near = walls.filter(move |wall| (wall - plane.offset).abs() < NEAR * extent);
+        near.map(move |offset| Plane { offset, ..plane })
     }
 }
 
