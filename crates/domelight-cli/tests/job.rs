@@ -33,6 +33,7 @@ fn a_picture_is_rendered_again_by_every_strategy() {
         "sir:2/20:resampling=reservoir",
         "median-cut:5",
         "variance-minimization:7",
+        "variance-minimization:7:rule=2009",
     ];
     for kind in StrategyKind::ALL {
         let name = kind.declaration().name;

@@ -151,7 +151,8 @@ const STRATEGIES: [(&str, usize, Option<Width>, Option<Light>); 9] = [
 ];
 
 /// Fixed lights, which err by what they leave out: they are only finite.
-const RIGS: [&str; 2] = ["median-cut:4", "variance-minimization:4"];
+const RIGS: [&str; 3] =
+    ["median-cut:4", "variance-minimization:4", "variance-minimization:4:rule=2009"];
 
 /// A tile of 3 × 3 pixels, which are of all levels.
 const SIDE: usize = 3;

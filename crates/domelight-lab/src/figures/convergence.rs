@@ -3,6 +3,7 @@
 use crate::Error;
 use domelight::code;
 use domelight::quote::{Code, Html, html};
+use domelight::rig::Rule;
 use domelight::sampling::SamplerKind;
 use domelight::strategy::{Proposal, StoppingRule, StrategySpec};
 
@@ -32,7 +33,10 @@ const METHODS: [(&str, SpecFor); 7] = [
         stop: StoppingRule::Tries(TRIES * n),
     }),
     ("median cut", |n| StrategySpec::MedianCut { n_lights: n }),
-    ("variance minimization", |n| StrategySpec::VarianceMinimization { n_lights: n }),
+    ("variance minimization", |n| StrategySpec::VarianceMinimization {
+        n_lights: n,
+        rule: Rule::Spherical,
+    }),
 ];
 
 /// One method at one count, over all seeds.

@@ -4,12 +4,12 @@ use crate::Error;
 use domelight::RgbImage;
 use domelight::quote::Code;
 use domelight::rig::{
-    LightPosition, MedianCut, Rig, RigError, ShadingReference, VarianceMinimization, median_cut,
-    variance_minimization,
+    LightPosition, MedianCut, Rig, RigError, Rule, ShadingReference, VarianceMinimization,
+    median_cut, variance_minimization,
 };
 use domelight::strategy::StrategySpec;
 
-use super::context::FigureContext;
+use super::context::{FigureContext, FigureScene};
 use super::figure::{Figure, Picture, Radiance, Row, Table, picture_panel, png_bytes};
 use super::formulas;
 use super::maps::{borders, mark};
@@ -40,41 +40,19 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         detail.panel("On the sphere, refined, 64", Some(&refined(LIGHTS)?))?,
     ];
 
-    let mut renders = Vec::new();
     let mut pictures = Vec::new();
-    for (figure_scene, name) in
-        [(full_scene(context)?, "scene"), (sphere_scene(context)?, "sphere")]
-    {
-        for (spec, title, file) in [
-            (StrategySpec::MedianCut { n_lights: LIGHTS as u32 }, "Median cut, 64", "median-cut"),
-            (
-                StrategySpec::VarianceMinimization { n_lights: LIGHTS as u32 },
-                "Variance min., 64",
-                "variance-minimization",
-            ),
-        ] {
-            let measured = figure_scene.measure(spec)?;
-            renders.push(lit_panel(title, &measured, figure_scene.tone()?)?);
-            let image = measured.render.layers.color;
-            pictures.push(Radiance {
-                name: format!("{name}-{file}"),
-                image,
-                tone: figure_scene.tone()?,
-            });
-        }
-        renders.push(converged_panel(&figure_scene)?);
-    }
+    let scene = lit_panels(&full_scene(context)?, "scene", &mut pictures)?;
+    let sphere = lit_panels(&sphere_scene(context)?, "sphere", &mut pictures)?;
     Ok(Figure {
         number: 7,
         title: "Variance minimization",
         slides: "slides 42–45",
         caption: Code::literal(
             "<p>Equal energy is not optimal for shading: one light can represent concentrated energy, but not energy \
-            that is spread out. Here a cut minimizes the larger of the two halves’ variances, the energy times the \
-            squared distance to the centroid (not the variance of the pixel values). The first row uses the poster’s \
-            rule, with distances on the map. The second uses the program’s default: distances on the sphere, without \
-            poles or seams; the worst region is cut first, then regions are joined and refined into cells around their \
-            lights. The detail shows the surroundings of the brightest light: lights (blue) sit on the bright \
+            that is spread out. The poster’s rule minimizes the larger of the two halves’ variances, the energy times \
+            the squared distance to the centroid on the map (not the variance of the pixel values). The program’s \
+            default minimizes the sum of both, with distances on the sphere, without poles or seams; the worst region \
+            is cut first, then regions are joined and refined into cells around their lights. The detail shows the surroundings of the brightest light: lights (blue) sit on the bright \
             features.</p>\
             <p>The table lists the RMS error of unoccluded shading over all normals, in percent of the RMS shading: \
             matte, and for a lobe cos<sup>20</sup>.</p>",
@@ -84,12 +62,41 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("The poster's rule", by_poster),
             Row::new("On the sphere, worst region first, refined", by_default),
             Row::new("One region in detail", details),
-            Row::new("The scene and a matte sphere, lit by 64 lights", renders),
+            Row::new("The scene, lit by 64 lights", scene),
+            Row::new("A matte sphere, lit by 64 lights", sphere),
         ],
         tables: vec![errors(context)?],
         has_data: false,
         pictures,
     })
+}
+
+/// A scene lit by the lights of every method, and its converged picture; adds the former to `pictures`.
+fn lit_panels(
+    scene: &FigureScene,
+    name: &str,
+    pictures: &mut Vec<Radiance>,
+) -> Result<Vec<Document>, Error> {
+    let mut panels = Vec::new();
+    for (spec, title, file) in lit_by() {
+        let measured = scene.measure(spec)?;
+        panels.push(lit_panel(title, &measured, scene.tone()?)?);
+        let image = measured.render.layers.color;
+        pictures.push(Radiance { name: format!("{name}-{file}"), image, tone: scene.tone()? });
+    }
+    panels.push(converged_panel(scene)?);
+    Ok(panels)
+}
+
+/// The strategies of the renders, with their titles and the names of their files.
+fn lit_by() -> [(StrategySpec, &'static str, &'static str); 3] {
+    let n_lights = LIGHTS as u32;
+    let minimized = |rule| StrategySpec::VarianceMinimization { n_lights, rule };
+    [
+        (StrategySpec::MedianCut { n_lights }, "Median cut, 64", "median-cut"),
+        (minimized(Rule::Poster), "The poster's rule, 64", "variance-minimization-2009"),
+        (minimized(Rule::Spherical), "On the sphere, 64", "variance-minimization"),
+    ]
 }
 
 /// Builds a rig with a number of lights.

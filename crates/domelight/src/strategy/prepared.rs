@@ -8,7 +8,9 @@ use super::{
 };
 use crate::environment::{CompensatedTable, Environment};
 use crate::math::Vec3;
-use crate::rig::{MedianCut, RigError, VarianceMinimization, median_cut, variance_minimization};
+use crate::rig::{
+    MedianCut, RigError, Rule, VarianceMinimization, median_cut, variance_minimization,
+};
 use crate::sampling::Sampler;
 use crate::simd::InstructionSet;
 
@@ -150,8 +152,11 @@ impl<'e> PreparedStrategy<'e> {
                 };
                 Self::Lights(LightSet::of(environment, rig)?)
             }
-            StrategySpec::VarianceMinimization { n_lights } => {
-                let settings = VarianceMinimization::default();
+            StrategySpec::VarianceMinimization { n_lights, rule } => {
+                let settings = match rule {
+                    Rule::Spherical => VarianceMinimization::default(),
+                    Rule::Poster => VarianceMinimization::poster(),
+                };
                 let rig = |environment: &Environment| {
                     variance_minimization(environment, n_lights as usize, settings)
                 };
@@ -298,5 +303,37 @@ impl Strategy for PreparedStrategy<'_> {
         if let (Self::Product(product), Some(pass)) = (self, pass) {
             product.brief(pass, findings.into_iter().flatten().collect());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::Orientation;
+    use crate::{Rgb, RgbImage};
+
+    #[test]
+    fn a_rule_of_variance_minimization_has_its_lights() {
+        let texel = |x: usize, y: usize| Rgb::splat(1.0 + ((x * 7 + y * 13) % 11) as f32);
+        let map = RgbImage::from_fn(32, 16, texel);
+        let environment = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let directions = |rig: &crate::rig::Rig| -> Vec<Vec3> {
+            rig.lights.iter().map(|light| light.direction).collect()
+        };
+        let of = |text: &str| {
+            let prepared = PreparedStrategy::new(text.parse().unwrap(), &environment).unwrap();
+            let PreparedStrategy::Lights(set) = prepared else { panic!("{text} has no lights") };
+            directions(&set.rig)
+        };
+        for (text, settings) in [
+            ("variance-minimization:8", VarianceMinimization::default()),
+            ("variance-minimization:8:rule=2009", VarianceMinimization::poster()),
+        ] {
+            let expected = directions(&variance_minimization(&environment, 8, settings).unwrap());
+            let found = of(text);
+            assert_eq!(found.len(), expected.len());
+            assert!(found.iter().zip(&expected).all(|(a, b)| a.abs_diff_eq(*b, 1e-5)), "{text}");
+        }
+        assert_ne!(of("variance-minimization:8"), of("variance-minimization:8:rule=2009"));
     }
 }

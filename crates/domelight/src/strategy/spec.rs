@@ -8,6 +8,7 @@
 //! | `rejection:16`, `rejection:rays=4:tries=256` | 16 tries; until 4 of at most 256 tries are accepted |
 //! | `sir:15/800`, `sir:15` | 15 of 800 candidates; a pilot chooses the number of candidates |
 //! | `median-cut:64`, `variance-minimization:64` | 64 directional lights |
+//! | `variance-minimization:64:rule=2009` | the lights of the poster's rule |
 //!
 //! Numbers are optional. Each strategy [declares](StrategyDeclaration) its name and its parameters. [`StrategySpec`]
 //! displays as the shortest such text, which parses to the same value.
@@ -16,6 +17,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{Candidates, Proposal, Resampling, StoppingRule};
+use crate::rig::Rule;
 use crate::sampling::Heuristic;
 
 /// A strategy with its parameters, independent of scene and environment.
@@ -79,6 +81,8 @@ pub enum StrategySpec {
     VarianceMinimization {
         /// The number of lights, 1 to 1,048,576.
         n_lights: u32,
+        /// The rule of the cuts. With the poster's, regions are also cut level by level and stay rectangles.
+        rule: Rule,
     },
 }
 
@@ -155,6 +159,9 @@ const RESAMPLINGS: Names<Resampling> = Names {
         Resampling::Reservoir,
     ],
 };
+
+const RULES: Names<Rule> =
+    Names { names: &["sphere", "2009"], values: &[Rule::Spherical, Rule::Poster] };
 
 /// What a strategy is called and takes. Its text form, its help and the manual's table are made from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -356,7 +363,14 @@ const VARIANCE_MINIMIZATION: StrategyDeclaration = StrategyDeclaration {
     name: "variance-minimization",
     aliases: &[],
     summary: "directional lights by variance minimization: noise-free, but biased",
-    parameters: &[StrategyParameter::count("lights", "64", "lights in place of the environment")],
+    parameters: &[
+        StrategyParameter::count("lights", "64", "lights in place of the environment"),
+        StrategyParameter::named(
+            "rule",
+            &RULES,
+            "how the map is divided: on the sphere, or as by Viriyothai & Debevec 2009",
+        ),
+    ],
     numbers: [&["lights"], &[]],
 };
 
@@ -581,7 +595,10 @@ impl StrategySpec {
             K::Rejection => Self::rejection(given)?,
             K::Sir => Self::sir(given)?,
             K::MedianCut => Self::MedianCut { n_lights: n_lights() },
-            K::VarianceMinimization => Self::VarianceMinimization { n_lights: n_lights() },
+            K::VarianceMinimization => Self::VarianceMinimization {
+                n_lights: n_lights(),
+                rule: given.named("rule", &RULES),
+            },
         })
     }
 
@@ -729,8 +746,12 @@ impl StrategySpec {
                 format!("sir {n_samples}/{m}, {from}, {how}")
             }
             Self::MedianCut { n_lights } => format!("median cut, {n_lights} lights"),
-            Self::VarianceMinimization { n_lights } => {
-                format!("variance minimization, {n_lights} lights")
+            Self::VarianceMinimization { n_lights, rule } => {
+                let by = match rule {
+                    Rule::Spherical => "",
+                    Rule::Poster => " by the rule of 2009",
+                };
+                format!("variance minimization{by}, {n_lights} lights")
             }
         }
     }
@@ -751,8 +772,13 @@ impl fmt::Display for StrategySpec {
         match *self {
             Self::Brdf { n_samples } | Self::Environment { n_samples } => write!(f, ":{n_samples}"),
             Self::Product { n_rays } => write!(f, ":{n_rays}"),
-            Self::MedianCut { n_lights } | Self::VarianceMinimization { n_lights } => {
-                write!(f, ":{n_lights}")
+            Self::MedianCut { n_lights } => write!(f, ":{n_lights}"),
+            Self::VarianceMinimization { n_lights, rule } => {
+                write!(f, ":{n_lights}")?;
+                if rule == Rule::default() {
+                    return Ok(());
+                }
+                write!(f, ":rule={}", RULES.name(rule))
             }
             Self::Mis { n_environment, n_brdf, n_portal, heuristic, compensation } => {
                 write!(f, ":{n_environment}:{n_brdf}")?;
@@ -836,6 +862,8 @@ mod tests {
             ("rejection:proposal=environment", "rejection:16:proposal=environment"),
             ("rejection:rays=4", "rejection:rays=4:tries=256"),
             ("median-cut:64", "median-cut:64"),
+            ("variance-minimization:rule=sphere", "variance-minimization:64"),
+            ("variance-minimization:16:rule=2009", "variance-minimization:16:rule=2009"),
         ] {
             assert_eq!(displayed(text), canonical, "{text}");
         }
@@ -877,7 +905,7 @@ mod tests {
             },
             StrategyKind::MedianCut => StrategySpec::MedianCut { n_lights: m },
             StrategyKind::VarianceMinimization => {
-                StrategySpec::VarianceMinimization { n_lights: m }
+                StrategySpec::VarianceMinimization { n_lights: m, rule: pick(pcg, &RULES) }
             }
         }
     }
@@ -912,6 +940,7 @@ mod tests {
             ("mis:heuristic=best", "one of power, balance"),
             ("mis:1", "at least one sample of each"),
             ("rejection:rays=1", "at least two"),
+            ("variance-minimization:rule=2010", "one of sphere, 2009"),
         ] {
             let error = text.parse::<StrategySpec>().expect_err(text).to_string();
             assert!(error.contains(words), "{text}: {error}");
@@ -945,5 +974,9 @@ mod tests {
             "sir 15/800, mixture candidates, sorted systematic resampling"
         );
         assert_eq!(described("rejection"), "rejection from the tighter envelope, 16 tries");
+        assert_eq!(
+            described("variance-minimization:9:rule=2009"),
+            "variance minimization by the rule of 2009, 9 lights"
+        );
     }
 }
