@@ -68,6 +68,8 @@ export class App {
   readonly embeds = document.documentElement.dataset.embed === "step";
   /** Counts the changes of the dropped files. */
   revision = 0;
+  /** Counts the lights that the engines have held. */
+  lightRevision = 0;
   /** What the reference's engine holds. */
   private held: { host: Host | null; drops: App["drops"] | null; scene: string; env: string; rotate: number } = { host: null, drops: null, scene: "", env: "", rotate: NaN };
   /** Whether to adopt the light of the next loaded scene. */
@@ -184,6 +186,7 @@ export class App {
   /** Shows another state; the browser's Back leads to the one before. */
   private go(state: State) {
     history.pushState(null, "", `#${toHash(state)}`);
+    this.address = location.hash;
     this.history.note(state);
     this.restore(state);
   }
@@ -239,6 +242,11 @@ export class App {
     return { scene: JSON.stringify({ scene, material, materials: missing.scene ? {} : materials, ground }), env: JSON.stringify({ probe, rows, reduce: isBuiltinProbe(probe) ? 1 : reduce, exposure: ev, scale }), rotate };
   }
 
+  /** Whether the engines hold the state's light. */
+  get holdsLight(): boolean {
+    return this.loaded.env === this.keys().env && this.loaded.rotate === this.state.rotate;
+  }
+
   /** Loads the parts of the state that are not loaded yet, then notifies the panels. */
   readonly load = latest(async () => {
     let what: Change = "render";
@@ -251,6 +259,7 @@ export class App {
       if (this.loaded.rotate !== rotate) {
         await this.engines.all("turnEnvironment", rotate);
         this.loaded.rotate = rotate;
+        this.lightRevision++;
         if (what === "render") what = "turn";
       }
     } catch (error) {
@@ -263,6 +272,8 @@ export class App {
         Object.assign(this.state, { material: "", materials: {} });
         this.load();
       }
+      // The lecture's figure has waited for the light.
+      this.emit("panel");
       return;
     } finally {
       clearTimeout(busy);
@@ -312,6 +323,7 @@ export class App {
     if (this.loaded.env !== env) {
       this.probe = (await all("loadEnvironment", withTurn(env, rotate))) as ProbeReport;
       this.loaded = { ...this.loaded, env, rotate };
+      this.lightRevision++;
       if (what === "render") what = "light";
     }
     return what;

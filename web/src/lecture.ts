@@ -18,6 +18,8 @@ const embedding = (state: State) =>
 export class Lecture {
   private shown = -1;
   private stage: Stage | null = null;
+  /** The light of the figure, by the count of `App.lightRevision`. */
+  private light = -1;
 
   constructor(private app: App) {
     $("steps").replaceChildren(...STEPS.map(({ title }, i) => {
@@ -46,7 +48,8 @@ export class Lecture {
   private changed(what: Change) {
     if (this.app.state.panel !== "lecture" || what === "view" || what === "pixel") return;
     const step = Math.min(Math.max(Math.round(this.app.state.step) - 1, 0), STEPS.length - 1);
-    if (step !== this.shown || ["all", "scene", "light"].includes(what)) this.show(step);
+    const isNew = step !== this.shown || what === "all";
+    if (isNew || (this.app.holdsLight && this.light !== this.app.lightRevision)) this.show(step);
   }
 
   /** Shows the lecture for a room full of people, in full screen where the browser permits it. */
@@ -73,8 +76,9 @@ export class Lecture {
   }
 
   private go(step: number) {
+    // The step that is shown begins anew, too.
+    this.shown = -1;
     this.app.set({ step: step + 1, figure: "" }, "panel");
-    this.show(step);
     $("step").scrollIntoView({ block: "start" });
   }
 
@@ -106,8 +110,10 @@ export class Lecture {
       return button;
     });
     $("step").replaceChildren(...elements, h("div", { class: "opens", role: "group", "aria-label": "This situation in other panels" }, "See it in", ...open), h("div", { class: "steps" }, move("← Previous", i - 1), move("Next →", i + 1)));
-    // Figures need a map.
-    this.stage = this.app.probe ? new Stage(figure, this.app, this.app.state.figure.split(";"), answer) : null;
+    // Figures wait for their light.
+    const { app } = this;
+    this.stage = app.holdsLight ? new Stage(figure, app, app.state.figure.split(";"), answer) : null;
+    this.light = this.stage ? app.lightRevision : -1;
     if (this.stage) FIGURES[i](this.stage);
     document.documentElement.dataset.step = String(i + 1);
     if (!this.stage) return;

@@ -101,10 +101,11 @@ export const brightness = (page, id) => ofCanvas(page, id, "mean");
 export const text = (page, selector) => page.$eval(selector, (e) => e.textContent);
 
 /** Moves a slider like a person who drags it. */
-export const slide = (page, selector, value) => page.$eval(selector, (input, value) => {
+export const slide = (page, selector, value) => page.evaluate(([selector, value]) => {
+  const input = document.querySelector(selector);
   input.value = String(value);
   input.dispatchEvent(new Event("input", { bubbles: true }));
-}, value);
+}, [selector, value]);
 
 /** Drops files and folders of the disk on the page, as a hand does. */
 export async function drop(page, paths) {

@@ -584,7 +584,19 @@ async function showStep(page, step) {
   await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=${step}${step === 12 ? "&figure=counts;0;1" : ""}`);
   await page.waitForSelector(`html[data-step='${step}']`);
   await drawn(page, 1);
+  await settled(page);
 }
+
+/** What somebody does to the figure at one moment, and the values of its controls after it. */
+const touch = (page, act = "none") => page.evaluate((act) => {
+  const controls = [...document.querySelectorAll("#figure :is(input, select)")];
+  if (act === "step up") {
+    const slider = controls.find(({ type }) => type === "range");
+    slider.stepUp();
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+  }
+  return controls.map(({ value }) => value).join(";");
+}, act);
 
 /** Waits until the lecture's figure shows what its controls say. */
 const settled = (page) => page.waitForSelector("#figure:not([data-drawing])");
@@ -1369,9 +1381,7 @@ test("each step shows its situation in other panels, and one comes back to its f
     assert.ok(n > 0, `step ${step} is seen somewhere else`);
     for (let k = 0; k < n; k++) {
       const button = page.locator("#step .opens button").nth(k), [panel] = (await button.textContent()).toLowerCase().replace("-", "").split(":");
-      const values = () => page.$$eval("#figure input, #figure select", (all) => all.map(({ value }) => value).join(";"));
-      if (k === 0 && step !== 12) await page.$eval("#figure input", (input) => { input.stepUp(); input.dispatchEvent(new Event("input", { bubbles: true })); });
-      const before = await values();
+      const before = await touch(page, k === 0 && step !== 12 ? "step up" : "none");
       await page.evaluate(() => { for (const key of ["map", "xray", "rig"]) delete document.documentElement.dataset[key]; });
       await button.click();
       await page.waitForSelector(`#${panel}:not([hidden])`);
@@ -1383,12 +1393,50 @@ test("each step shows its situation in other panels, and one comes back to its f
       assert.equal(await back.textContent(), `← Back to step ${step}`);
       await back.click();
       await page.waitForSelector(`html[data-step='${step}']`);
-      await page.waitForSelector("#lecture:not([hidden]) #figure");
-      assert.equal(await values(), before, `step ${step} is as it was left`);
+      await page.waitForSelector("#lecture:not([hidden])");
+      await drawn(page, 1);
+      assert.equal(await touch(page), before, `step ${step} is as it was left`);
       assert.equal(await page.evaluate(() => window.domelight.app.state.scene), "sphere", "and so is the picture");
       assert.ok(await back.isHidden());
     }
   }
+  await done();
+});
+
+test("what is changed after “See it in” is in the address, too", async () => {
+  const { page, done } = await open(`${LECTURE}&step=1`);
+  await drawn(page, 1);
+  await page.locator("#step .opens button").first().click();
+  await page.waitForSelector("#picture:not([hidden])");
+  await slide(page, "#exposure", -2);
+  await page.waitForFunction(() => /exposure=-2/.test(location.hash));
+  await page.click("#back");
+  await page.waitForSelector("#lecture:not([hidden])");
+  await drawn(page, 1);
+  await slide(page, "#figure input", 0.5);
+  await page.waitForFunction(() => /figure=0\.5/.test(location.hash));
+  await done();
+});
+
+test("a figure is drawn once for a link, under its light", async () => {
+  const { page, done } = await open(`${LECTURE}&step=7`);
+  await drawn(page, 1);
+  await page.evaluate(() => {
+    window.figures = new Set();
+    new MutationObserver(() => window.figures.add(document.getElementById("figure"))).observe(document.getElementById("step"), { childList: true, subtree: true, attributes: true });
+  });
+  const link = `${LECTURE.replace("scene=sphere", "scene=statue")}&env=cathedral&step=7`;
+  await page.evaluate((hash) => { location.hash = hash; }, link);
+  await page.waitForFunction(() => window.domelight.app.scene?.triangles > 10_000 && !document.querySelector("#figure[data-drawing]") && document.querySelector("#figure[data-drawn]"));
+  assert.match(await text(page, "#figure .result"), /of cathedral, which holds/);
+  // The text stands while the light is loaded, and the figure is then drawn in its place.
+  assert.ok(await page.evaluate(() => window.figures.size) <= 2);
+  // Light that is changed elsewhere is the figure's when one comes back.
+  await show(page, "picture");
+  await page.selectOption("#env", "studio");
+  await page.waitForFunction(() => window.domelight.app.holdsLight);
+  await show(page, "lecture");
+  await page.waitForFunction(() => /of studio, which holds/.test(document.querySelector("#figure .result").textContent));
   await done();
 });
 
