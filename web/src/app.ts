@@ -92,7 +92,7 @@ export class App {
       this.history.note(this.state);
       this.forgetError();
       this.emit("all");
-      this.load();
+      this.load(true);
     });
   }
 
@@ -166,7 +166,7 @@ export class App {
     this.forgetError();
     this.keepInAddress();
     this.emit("all");
-    this.load();
+    this.load(true);
   }
 
   /** The state in which the lecture was left for a panel that shows its situation. */
@@ -242,13 +242,22 @@ export class App {
     return { scene: JSON.stringify({ scene, material, materials: missing.scene ? {} : materials, ground }), env: JSON.stringify({ probe, rows, reduce: isBuiltinProbe(probe) ? 1 : reduce, exposure: ev, scale }), rotate };
   }
 
-  /** Whether the engines hold the state's light. */
+  /** Whether the engines hold the state's light, and its scene, too. */
   get holdsLight(): boolean {
     return this.loaded.env === this.keys().env && this.loaded.rotate === this.state.rotate;
   }
+  get holdsAll(): boolean {
+    return this.holdsLight && this.loaded.scene === this.keys().scene;
+  }
 
-  /** Loads the parts of the state that are not loaded yet, then notifies the panels. */
-  readonly load = latest(async () => {
+  /** Whether another change follows, when scene and light of a new state are loaded. */
+  waits(what: Change): boolean {
+    return what === "all" && !this.holdsAll;
+  }
+
+  /** Loads the parts of the state that are not loaded yet, then notifies the panels. If they know of the state, what
+   *  they need not wait for is done. */
+  readonly load = latest(async (isKnown = false) => {
     let what: Change = "render";
     // What takes long is said before it has taken a fifth of a second.
     const busy = setTimeout(() => this.progress(LOADING), 150);
@@ -272,8 +281,7 @@ export class App {
         Object.assign(this.state, { material: "", materials: {} });
         this.load();
       }
-      // The lecture's figure has waited for the light.
-      this.emit("panel");
+      if (isKnown) this.emit("render");
       return;
     } finally {
       clearTimeout(busy);
@@ -282,7 +290,7 @@ export class App {
     this.good = { state: { ...this.state }, files: this.files, drops: this.drops, loaded: { ...this.loaded } };
     this.tellMissing();
     this.tellWarnings();
-    this.emit(what);
+    if (what !== "render" || !isKnown) this.emit(what);
   });
 
   /** Loads scene and light into as many engines as fit into memory. */

@@ -150,7 +150,7 @@ export class LightsPanel {
     $<HTMLInputElement>("refine").checked = state.refine;
     $<HTMLInputElement>("refine").disabled = state.method !== "variance-minimization";
     $<HTMLInputElement>("n-lights").value = String(place(state.lights));
-    this.draw();
+    if (!this.app.waits(what)) this.draw();
   }
 
   private readonly draw = latest(async () => {

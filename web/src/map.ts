@@ -94,6 +94,7 @@ export class MapPanel {
     $<HTMLSelectElement>("layer").value = state.layer;
     $<HTMLInputElement>("n-samples").value = String(state.samples);
     $("n-samples-value").textContent = String(this.nSamples);
+    if (this.app.waits(what)) return;
     if (what === "view") {
       this.mark();
       this.lay();

@@ -91,7 +91,7 @@ export class PicturePanel {
       return;
     }
     this.showView();
-    if (!this.app.scene || !this.app.probe) return;
+    if (!this.app.scene || !this.app.probe || this.app.waits(what)) return;
     const { panel, step, figure, pixel, compared, exposure, curve, view, mapping, layer, samples, method, refine, lights, sun, lamps, leave, gloss, ...rendered } = this.app.state;
     const key = JSON.stringify(rendered);
     // A changed hash may concern only another panel.

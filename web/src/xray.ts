@@ -14,7 +14,7 @@ interface Report {
   summary: { pixel: [number, number]; coverage: number };
   strategies: {
     name: string; mean: number; variance: number; raysPerSample: number; variancePerRay: number; diagnosis: string;
-    causes: [string, number][]; samples: { place: [number, number]; weight: number; visibility: number }[];
+    causes: [string, number][]; samples: { place: [number, number]; weight: number; visibility: number }[]; density: number[];
   }[];
   advice: string;
 }
@@ -28,7 +28,7 @@ export class XrayPanel {
   private markMap: (place: [number, number] | null) => void;
   /** The maps of the hemisphere, and the rays of each strategy with its mark. */
   private maps: Float32Array = new Float32Array();
-  private rays: { name: string; density: Float32Array; mark: (place: [number, number] | null) => void }[] = [];
+  private rays: { name: string; density: number[]; mark: (place: [number, number] | null) => void }[] = [];
 
   constructor(private app: App, private direction: Direction) {
     app.on((what) => this.changed(what));
@@ -106,7 +106,7 @@ export class XrayPanel {
 
   private changed(what: Change) {
     if (what === "all") this.fillCompared();
-    if (this.app.state.panel === "xray" && this.app.probe && what !== "view") this.look();
+    if (this.app.state.panel === "xray" && this.app.probe && what !== "view" && !this.app.waits(what)) this.look();
   }
 
   private readonly look = latest(async () => {
@@ -128,10 +128,8 @@ export class XrayPanel {
       this.maps = maps;
       if (maps.length) this.paint(maps);
       await this.paintMap();
-      const densities: Float32Array[] = [];
-      for (const { name } of report.strategies) densities.push((await app.engines.call("directions", settings([name]), DENSITY)) as Float32Array);
       this.rays = [];
-      $("densities").replaceChildren(...report.strategies.flatMap((strategy, i) => (densities[i].length ? [this.density(strategy, densities[i])] : [])));
+      $("densities").replaceChildren(...report.strategies.filter(({ density }) => density.length).map((strategy) => this.density(strategy)));
       this.tell(report);
       this.follow();
     } catch (error) {
@@ -159,11 +157,12 @@ export class XrayPanel {
     this.map.show(0, film);
   }
 
-  private density(strategy: Report["strategies"][0], density: Float32Array) {
+  private density(strategy: Report["strategies"][0]) {
+    const { density } = strategy;
     const canvas = h("canvas", { width: String(SIZE), height: String(SIZE), role: "img", "aria-label": `Directions of ${strategy.name}` });
     const context = canvas.getContext("2d")!;
     const small = h("canvas", { width: String(DENSITY), height: String(DENSITY) }), inner = small.getContext("2d")!;
-    const image = inner.createImageData(DENSITY, DENSITY), sorted = density.filter((value) => value > 0).sort();
+    const image = inner.createImageData(DENSITY, DENSITY), sorted = Float32Array.from(density).filter((value) => value > 0).sort();
     // Full opacity is at the 99th percentile, because otherwise a sun would make everything else invisible.
     const most = sorted[Math.floor(0.99 * (sorted.length - 1))] ?? 1;
     density.forEach((value, i) => image.data.set([255, 96, 176, 255 * Math.sqrt(Math.min(value / most, 1))], 4 * i));

@@ -36,7 +36,6 @@ macro_rules! for_each_call {
             mapSamples = map_samples(n: usize, seed: u32) -> Result<String, Error>;
             inspect = inspect(settings: &str) -> Result<String, Error>;
             hemisphere = hemisphere(settings: &str, resolution: usize) -> Result<Vec<f32>, Error>;
-            directions = directions(settings: &str, resolution: usize) -> Result<Vec<f32>, Error>;
             lobeSection = lobe_section(material: &str, theta_o: f32, n: usize) -> Result<Vec<f32>, Error>;
             lobeSamples = lobe_samples(material: &str, theta_o: f32, n: usize, seed: u32) -> Result<Vec<f32>, Error>;
             lights = lights(settings: &str) -> Result<String, Error>;

@@ -13,7 +13,7 @@ use crate::setup::{CameraState, parse, to_json};
 use crate::{Engine, Error};
 
 /// Pixels along an edge of a strategy's directions.
-const DIRECTIONS: usize = 64;
+const DIRECTIONS: usize = 48;
 
 /// The settings of [`Engine::inspect`].
 #[derive(Deserialize)]
@@ -48,7 +48,10 @@ struct StrategyReport {
     variance_per_ray: f64,
     diagnosis: String,
     causes: Vec<(String, f64)>,
+    /// Some of its rays.
     samples: Vec<DirectionSample>,
+    /// Rays per solid angle \[sr⁻¹\] on a square map of the hemisphere; empty where the pixel shows no surface.
+    density: Vec<f32>,
 }
 
 impl Engine {
@@ -91,15 +94,15 @@ impl Engine {
     pub fn inspect(&self, json: &str) -> Result<String, Error> {
         let environment = self.environment()?.clone();
         self.inspected(json, |inspector, state| {
-            let (mut found, mut samples): (Vec<Decomposition>, Vec<_>) = Default::default();
+            let (mut found, mut rays): (Vec<Decomposition>, Vec<_>) = Default::default();
             for name in &state.strategies {
                 let spec: StrategySpec = name.parse().map_err(error)?;
                 let strategy = PreparedStrategy::new(spec, &environment).map_err(error)?;
                 found.push(inspector.decompose(name, &strategy));
                 let directions = inspector.directions(&strategy, DIRECTIONS);
-                samples.push(directions.map_or_else(Vec::new, |directions| directions.samples));
+                rays.push(directions.map_or_else(Default::default, |d| (d.samples, d.density)));
             }
-            let strategies = found.iter().zip(samples).map(|(d, samples)| StrategyReport {
+            let strategies = found.iter().zip(rays).map(|(d, (samples, density))| StrategyReport {
                 name: d.name.clone(),
                 mean: d.mean,
                 variance: d.variance,
@@ -108,6 +111,7 @@ impl Engine {
                 diagnosis: d.diagnosis(&found).to_string(),
                 causes: d.shares.iter().map(|s| (s.cause.to_string(), s.share)).collect(),
                 samples,
+                density,
             });
             let enclosure = inspector.enclosure().map(|enclosure| enclosure.to_string());
             Ok(to_json(&Report {
@@ -133,22 +137,6 @@ impl Engine {
             let visibility: Vec<Rgb> = maps.visibility.iter().map(|&v| Rgb::splat(v)).collect();
             let all = [&maps.radiance, &maps.bsdf_cos, &visibility, &maps.product];
             Ok(all.iter().flat_map(|map| map.iter().flat_map(|c| c.to_array())).collect())
-        })
-    }
-
-    /// Where a strategy, the first of those named, sends its rays: rays per solid angle \[sr⁻¹\] on a square map of
-    /// `resolution` pixels along an edge.
-    ///
-    /// # Errors
-    /// As [`Engine::inspect`].
-    pub fn directions(&self, json: &str, resolution: usize) -> Result<Vec<f32>, Error> {
-        let environment = self.environment()?.clone();
-        self.inspected(json, |inspector, state| {
-            let name = state.strategies.first().map_or("", String::as_str);
-            let spec: StrategySpec = name.parse().map_err(error)?;
-            let strategy = PreparedStrategy::new(spec, &environment).map_err(error)?;
-            let found = inspector.directions(&strategy, resolution);
-            Ok(found.map_or_else(Vec::new, |directions| directions.density))
         })
     }
 }
