@@ -1,12 +1,12 @@
 // Puts page, Worker and engine into one file: node build.mjs ENGINE.wasm
-import { build } from "esbuild";
+import { build, transform } from "esbuild";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { deflateRawSync } from "node:zlib";
 
-const [, , wasm] = process.argv;
+const [, , wasm] = process.argv, isPlain = !!process.env.PLAIN;
 const bundle = async (entry) => {
   const { outputFiles } = await build({
-    entryPoints: [entry], bundle: true, minify: !process.env.PLAIN, write: false, format: "iife", target: "es2022",
+    entryPoints: [entry], bundle: true, minify: !isPlain, write: false, format: "iife", target: "es2022",
     // The engine's script would look for its module beside itself; the page hands it over instead.
     define: { "import.meta.url": "''" }, logLevel: "error",
   });
@@ -17,7 +17,7 @@ const attribute = (value) => value.replaceAll("&", "&amp;").replaceAll('"', "&qu
 const inScript = (code) => code.replaceAll("</script", "<\\/script").replaceAll("<!--", "<\\!--");
 const packed = deflateRawSync(readFileSync(wasm), { level: 9 }).toString("base64");
 const parts = {
-  STYLE: text("src/style.css").replace("@FONT@", readFileSync(new URL("fonts/stix-two-math.woff2", import.meta.url)).toString("base64")),
+  STYLE: (await transform(text("src/style.css"), { loader: "css", minify: !isPlain })).code.replace("@FONT@", readFileSync(new URL("fonts/stix-two-math.woff2", import.meta.url)).toString("base64")),
   MAIN: inScript(await bundle("src/main.ts")),
   WORKER: inScript(await bundle("src/worker.ts")),
   ENGINE: packed,

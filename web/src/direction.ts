@@ -1,7 +1,9 @@
 // One direction, pointed at in any picture of directions, and its places in the others.
 
 import type { App } from "./app";
-import { h } from "./dom";
+import { h, short } from "./dom";
+import { isArrow, moved } from "./pointer";
+import { develop, type Curve } from "./tone";
 
 /** Places on the map, and on the hemisphere above the picked pixel unless it is below the horizon. */
 export interface Places {
@@ -47,6 +49,18 @@ export function placeOf(event: PointerEvent, picture: HTMLElement): [number, num
   return [within((event.clientX - box.left) / box.width), within((event.clientY - box.top) / box.height)];
 }
 
+/** Reads a picture with a mark by keys: arrows move the mark from where it is shown, in small steps with Shift. */
+export function readByKeys(picture: HTMLElement, label: string, point: (place: [number, number]) => void) {
+  for (const [name, value] of Object.entries({ tabindex: "0", role: "application", "aria-label": label, "aria-describedby": "keys-of-pictures" })) picture.setAttribute(name, value);
+  picture.addEventListener("keydown", (event) => {
+    if (!isArrow(event.key) || event.ctrlKey || event.altKey || event.metaKey) return;
+    event.preventDefault();
+    const { hidden, style } = picture.querySelector<HTMLElement>(".mark")!, [u, v] = hidden ? [0.5, 0.5] : [parseFloat(style.left) / 100, parseFloat(style.top) / 100];
+    const [x, y] = moved([u, 1 - v], event), most = 0.999999;
+    point([Math.min(x, most), Math.min(1 - y, most)]);
+  });
+}
+
 /** A scale of colors with its values. */
 export function colorBar(place: HTMLElement, label: string, gradient: string, values: [at: number, text: string][]) {
   const ramp = h("div", { class: "ramp" });
@@ -62,3 +76,15 @@ export function colorBar(place: HTMLElement, label: string, gradient: string, va
     return value;
   })));
 }
+
+/** The luminances of a picture under an exposure and a curve, `STOPS` below middle gray to as many above. */
+export function toneBar(place: HTMLElement, label: string, { exposure, curve }: { exposure: number; curve: Curve }) {
+  const byte = new Uint8ClampedArray(4), grays = Array.from({ length: 17 }, (_, i) => {
+    const gray = MIDDLE * 2 ** (STOPS * (i / 8 - 1));
+    develop(gray, gray, gray, curve, byte, 0);
+    return `rgb(${byte[0]} ${byte[0]} ${byte[0]})`;
+  });
+  const value = (stops: number) => short(Number((MIDDLE * 2 ** (stops - exposure)).toPrecision(2)));
+  colorBar(place, label, `linear-gradient(to right, ${grays.join(", ")})`, [[0, value(-STOPS)], [0.5, value(0)], [1, value(STOPS)]]);
+}
+const MIDDLE = 0.18, STOPS = 5;

@@ -104,7 +104,16 @@ export const STRATEGIES: Kind[] = [
     },
   },
   one("median-cut", "median cut", "Lights", 64, 1024),
-  one("variance-minimization", "variance minimization", "Lights", 64, 1024),
+  {
+    key: "variance-minimization", label: "variance minimization",
+    fields: [whole("Lights", 64, 1024), choice("Rule", [["sphere", "on the sphere"], ["2009", "of 2009"]])],
+    text: ([n, rule]) => `variance-minimization:${n}${rule === "2009" ? ":rule=2009" : ""}`,
+    parse: (words) => {
+      const numbers = words.filter(isCount), rest = words.filter((word) => !isCount(word));
+      if (numbers.length > 1 || !rest.every((word) => /^rule=(sphere|2009)$/.test(word))) return null;
+      return [numbers[0] ?? "64", option(rest, "rule") ?? "sphere"];
+    },
+  },
 ];
 
 const METALS: [string, string][] = ["gold", "copper", "silver", "aluminum", "chromium", "tungsten"].map((metal) => [metal, metal]);

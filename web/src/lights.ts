@@ -1,7 +1,7 @@
 // The Lights panel: a probe as a rig, with its regions, its shading and its files.
 
 import type { App, Change } from "./app";
-import { mark, placeOf } from "./direction";
+import { mark, placeOf, readByKeys } from "./direction";
 import { $, degrees, h, latest, percentage, save, short, words } from "./dom";
 import { Film, FilmView, luminance } from "./film";
 import { lightWords, quoted } from "./state";
@@ -74,6 +74,10 @@ export class LightsPanel {
     this.showMark = mark(viewer);
     for (const event of ["pointerdown", "pointermove"] as const) viewer.addEventListener(event, (event) => {
       this.pointed = placeOf(event, viewer);
+      this.read();
+    });
+    readByKeys(viewer, "The light probe divided into regions", (place) => {
+      this.pointed = place;
       this.read();
     });
     app.on((what) => this.changed(what));

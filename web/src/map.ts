@@ -1,7 +1,7 @@
 // The Map panel: the probe in any mapping, and how the picked pixel samples it.
 
 import type { App, Change } from "./app";
-import { colorBar, mark, placeOf, type Direction } from "./direction";
+import { colorBar, mark, placeOf, readByKeys, type Direction } from "./direction";
 import { $, degrees, fill, h, latest, short, stops } from "./dom";
 import { Film, FilmView, luminance } from "./film";
 import type { MapPicture } from "./protocol";
@@ -74,11 +74,13 @@ export class MapPanel {
     });
     for (const end of ["pointerup", "pointercancel"]) viewer.addEventListener(end, () => { last = null; });
     viewer.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: 5, ArrowRight: -5 }[event.key];
+      const step = event.shiftKey && { ArrowLeft: 5, ArrowRight: -5 }[event.key];
       if (!step) return;
       event.preventDefault();
+      event.stopImmediatePropagation();
       rotate(app.state.rotate + step);
     });
+    readByKeys(viewer, "Light probe. Drag it, or use Shift with the left and right arrow keys, to rotate it.", (place) => this.point(place));
   }
 
   private get nSamples() {

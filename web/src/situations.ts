@@ -35,7 +35,7 @@ export const SITUATIONS: Situation[][] = [
   [picture("two of the four ways at equal rays", { scene: "sphere-orthographic", material: PHONG, env: "cathedral", rotate: 0, hide: true, strategy: "mis:50:38", beside: "sir:15/800", spp: 1, size: 320 })],
   [picture("fixed lights beside random samples", { scene: "statue", ground: true, strategy: "median-cut:16", beside: "product:8", size: 320, spp: 8 })],
   [lights("the cuts, one by one", { method: "median-cut", refine: false, lights: 16 }), picture("64 lights", { scene: "statue", ground: true, strategy: "median-cut:64", size: 320, spp: 4 })],
-  [lights("the regions, one by one", { method: "variance-minimization", refine: false, lights: 16 }), picture("64 lights of each method", { scene: "statue", ground: true, strategy: "median-cut:64", beside: "variance-minimization:64", size: 320, spp: 4 })],
+  [lights("the regions, one by one", { method: "variance-minimization", refine: false, lights: 16 }), picture("64 lights of each method", { scene: "statue", ground: true, strategy: "median-cut:64", beside: "variance-minimization:64:rule=2009", size: 320, spp: 4 })],
   [picture("stratified samples fall steeper", { env: "studio", strategy: "environment:4", spp: 64, size: 320 })],
   [picture("with learned visibility, and without", { scene: "statue", ground: true, strategy: "sir:8/64", beside: "product:8", size: 320, spp: 8 }), xray("what learned visibility leaves", { scene: "statue", strategy: "product:8", compared: "product:8" })],
   [picture("a room with a window", { scene: "room", strategy: "mis:4:4", beside: "product:8", size: 320, spp: 8 })],

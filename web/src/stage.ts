@@ -3,7 +3,7 @@
 import type { App } from "./app";
 import { h, latest, short } from "./dom";
 import { player } from "./player";
-import { onPointer, type Pointed } from "./pointer";
+import { framedIn, onPointer, placeOn, type Pointed } from "./pointer";
 
 /** A slider's value, and how a figure sets it. */
 export interface Slider {
@@ -12,18 +12,34 @@ export interface Slider {
   readonly input: HTMLInputElement;
 }
 
+/** A place in one of a figure's plots and maps, in its units. */
+export type Mark = Pick<Pointed, "frame" | "x" | "y">;
+
+/** Draws SVGs in the place of others, which keep the focus. */
+export function drawInto(place: HTMLElement, markup: string) {
+  const fresh = h("template");
+  fresh.innerHTML = markup;
+  const [before, after] = [[...place.children], [...fresh.content.children]];
+  if (before.length !== after.length) return place.replaceChildren(...after);
+  after.forEach((svg, i) => {
+    for (const { name, value } of svg.attributes) if (name !== "aria-hidden") before[i].setAttribute(name, value);
+    before[i].replaceChildren(...svg.childNodes);
+  });
+}
+
 /** Controls and a drawing area, filled by a figure. */
 export class Stage {
   private inputs: (HTMLInputElement | HTMLSelectElement)[] = [];
   readonly drawing = h("div");
   readonly result = h("p", { class: "result", role: "status" });
   /** The values under the pointer. */
-  private readout = h("p", { class: "readout" }, "\u00a0");
+  private readout = h("p", { class: "readout", "aria-live": "polite" }, "\u00a0");
+  private overlay = h("div", { class: "overlay" });
   private controls = h("div", { class: "controls" });
 
   /** `values` are the controls' values in order; missing or invalid values get the figure's defaults. */
   constructor(readonly place: HTMLElement, readonly app: App, private values: string[], private answers: (text: string) => void = () => {}) {
-    place.replaceChildren(this.drawing, this.readout, this.controls, this.result);
+    place.replaceChildren(this.drawing, this.readout, this.controls, this.result, this.overlay);
   }
 
   /** Adds a slider; `shown` formats its value. */
@@ -64,15 +80,43 @@ export class Stage {
 
   /** Reads the pointer over the figure's plots and maps; `drag` is called while it drags. */
   pointer(drag: (at: Pointed) => void): () => Pointed | null {
-    let pointed: Pointed | null = null;
     this.drawing.classList.add("touchable");
     onPointer(this.drawing, (at) => {
-      if (!at && !pointed) return;
-      pointed = at;
+      if (!at && !this.pointed) return;
+      this.pointed = at;
       if (at?.dragged) drag(at);
       this.redraw();
     });
-    return () => pointed;
+    return () => this.pointed;
+  }
+  private pointed: Pointed | null = null;
+
+  /** Marks places until the figure is drawn again. */
+  mark(...places: Mark[]) {
+    this.marked.push(...places);
+  }
+  private marked: Mark[] = [];
+
+  private showMarks() {
+    const { pointed, marked, overlay } = this, all = framedIn(this.drawing), origin = overlay.offsetParent?.getBoundingClientRect();
+    const places = origin ? [...(pointed?.byKeys ? [pointed] : []), ...marked].filter(({ frame }) => all[frame]) : [];
+    overlay.replaceChildren(...places.map(({ frame, x, y }) => {
+      const box = all[frame].getBoundingClientRect(), [u, v] = placeOn(all[frame], x, y), cross = h("span", { class: "mark" });
+      Object.assign(cross.style, { left: `${box.left + u * box.width - origin!.left}px`, top: `${box.top + v * box.height - origin!.top}px` });
+      return cross;
+    }));
+  }
+
+  /** Plots and maps take the focus, so that keys read them. */
+  private makeFocusable() {
+    if (!this.drawing.matches(".touchable")) return;
+    const all = framedIn(this.drawing);
+    all.forEach((framed, k) => {
+      const ofGroup = `${this.plots.getAttribute("aria-label") ?? "Plot"}${all.length > 1 ? `: ${k + 1} of ${all.length}` : ""}`;
+      const label = (framed instanceof HTMLCanvasElement && framed.getAttribute("aria-label")) || ofGroup;
+      framed.removeAttribute("aria-hidden");
+      for (const [name, value] of Object.entries({ tabindex: "0", role: "application", "aria-roledescription": "plot", "aria-label": label, "aria-describedby": "keys-of-plots" })) framed.setAttribute(name, value);
+    });
   }
 
   choice(name: string, values: [string, string][]): () => string {
@@ -109,11 +153,14 @@ export class Stage {
   }
   private readonly drawLatest = latest(async () => {
     this.isDrawing = true;
+    this.marked = [];
     try {
       await this.drawNow();
     } catch (error) {
       this.app.tell((error as Error).message, true);
     }
+    this.makeFocusable();
+    this.showMarks();
     this.isDrawing = false;
     this.drawn();
     this.place.dataset.drawn = String(Number(this.place.dataset.drawn ?? 0) + 1);
@@ -125,11 +172,19 @@ export class Stage {
     this.redraw();
   }
 
-  /** Shows an SVG with a text alternative, below other pictures. */
+  private plots = h("div", { role: "group" });
+
+  /** Shows SVGs with a text alternative, below other pictures. */
   svg(markup: string, label: string, ...above: HTMLElement[]) {
-    const image = h("div", { role: "img", "aria-label": label });
-    image.innerHTML = markup;
-    this.drawing.replaceChildren(...above, image);
+    this.plots.setAttribute("aria-label", label);
+    drawInto(this.plots, markup);
+    this.fill(...above, this.plots);
+  }
+
+  /** Shows pictures. Those that are shown stay, with the focus. */
+  fill(...pictures: HTMLElement[]) {
+    const { children } = this.drawing;
+    if (children.length !== pictures.length || pictures.some((picture, i) => children[i] !== picture)) this.drawing.replaceChildren(...pictures);
   }
 
   /** Shows the values under the pointer, if any. */

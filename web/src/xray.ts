@@ -1,7 +1,7 @@
 // The X-ray panel: the hemisphere above a pixel, the rays of each strategy, and the causes of noise.
 
 import type { App, Change } from "./app";
-import { colorBar, mark, placeOf, type Direction } from "./direction";
+import { colorBar, mark, placeOf, readByKeys, toneBar, type Direction } from "./direction";
 import { $, color, h, latest, percentage, short } from "./dom";
 import { Film, FilmView, luminance } from "./film";
 import { explain } from "./glossary";
@@ -23,6 +23,7 @@ const percent = (x: number) => `${short(100 * x)} %`;
 
 export class XrayPanel {
   private views: FilmView[] = [];
+  private bars = LAYERS.map(() => h("div"));
   private map = new FilmView($<HTMLCanvasElement>("xray-map-film"), false);
   private marks: ((place: [number, number] | null) => void)[];
   private markMap: (place: [number, number] | null) => void;
@@ -40,19 +41,20 @@ export class XrayPanel {
       return { marked: this.touchable(canvas), name };
     });
     this.marks = hemispheres.map(({ marked }) => mark(marked));
-    $("hemispheres").replaceChildren(...hemispheres.map(({ marked, name }) => h("figure", {}, marked, h("figcaption", {}, name))));
+    $("hemispheres").replaceChildren(...hemispheres.map(({ marked, name }, i) => h("figure", {}, marked, this.bars[i], h("figcaption", {}, name))));
     const map = $("xray-map").querySelector<HTMLElement>(".marked")!;
     this.markMap = mark(map);
+    readByKeys(map, "The map", (place) => this.point("lat-long", place));
     for (const event of ["pointerdown", "pointermove"] as const) map.addEventListener(event, (event) => this.point("lat-long", placeOf(event, map)));
   }
 
   /** A picture of the hemisphere that is pointed at. */
   private touchable(canvas: HTMLCanvasElement): HTMLElement {
-    const marked = h("div", { class: "marked" }, canvas);
+    const marked = h("div", { class: "marked" }, canvas), above = ([u, v]: [number, number]) => this.point("hemisphere", [2 * u - 1, 1 - 2 * v]);
     for (const event of ["pointerdown", "pointermove"] as const) marked.addEventListener(event, (event) => {
-      const [u, v] = placeOf(event, marked);
-      this.point("hemisphere", [2 * u - 1, 1 - 2 * v]);
+      above(placeOf(event, marked));
     });
+    readByKeys(marked, canvas.getAttribute("aria-label")!, above);
     return marked;
   }
 
@@ -143,9 +145,12 @@ export class XrayPanel {
     const n = 3 * SIZE * SIZE;
     this.views.forEach((view, i) => {
       const film = Film.fromRgb(SIZE, SIZE, maps.subarray(i * n, (i + 1) * n));
-      // Visibility and reflectance have fixed ranges; light has its own exposure.
-      view.set({ exposure: i === 2 ? 0 : film.exposure() + (i === 3 ? 1 : 0), curve: i === 2 ? "standard" : "agx" });
+      // Visibility has a fixed range; the others have their own exposure.
+      const isVisibility = i === 2, tone = { exposure: isVisibility ? 0 : film.exposure() + (i === 3 ? 1 : 0), curve: isVisibility ? "standard" as const : "agx" as const };
+      view.set(tone);
       view.show(0, film);
+      if (isVisibility) colorBar(this.bars[i], LAYERS[i], "linear-gradient(to right, #000, #fff)", [[0, "0"], [1, "1"]]);
+      else toneBar(this.bars[i], `Luminance of ${LAYERS[i]}`, tone);
     });
   }
 

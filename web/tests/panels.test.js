@@ -222,7 +222,7 @@ test("the map turns, shows the sun, and what a pixel samples", async () => {
   assert.match(await text(page, "#map-caption"), /sky, 128 × 64 texels, rotated by 125°; the sun is outlined/);
   const first = await canvasHash(page, "map-film");
   await page.focus("#map-viewer");
-  await page.keyboard.press("ArrowLeft");
+  await page.keyboard.press("Shift+ArrowLeft");
   await page.waitForFunction(() => /130°/.test(document.getElementById("map-caption").textContent));
   assert.notEqual(await canvasHash(page, "map-film"), first);
   await page.selectOption("#mapping", "angular");
@@ -735,8 +735,10 @@ test("steps 14 and 15 show pictures under the lights, whose error falls with the
   await page.evaluate((hash) => { location.hash = hash; }, `${LECTURE}&step=15&figure=3;pictures`);
   await page.waitForSelector("html[data-step='15']");
   await drawn(page, 1);
-  assert.equal(await page.locator("#figure .quartet canvas").count(), 3);
-  assert.match(await text(page, "#figure .result"), /by variance minimization and [\d.]+\s% by median cut/);
+  assert.equal(await page.locator("#figure .quartet canvas").count(), 4);
+  // The rule that the step explains is rendered, too.
+  const errors = /is ([\d.]+)\s% by median cut, ([\d.]+)\s% by the rule of 2009, ([\d.]+)\s% by variance minimization/.exec(await text(page, "#figure .result")).slice(1).map(Number);
+  assert.equal(new Set(errors).size, 3, `${errors}`);
   await done();
 });
 
@@ -811,6 +813,111 @@ test("the figure of every step plays, pauses, is dragged and read", async (t) =>
     if (![7, 12, 14, 15].includes(step)) assert.notEqual(await values(), set, "dragging moves a slider");
     assert.notEqual(await read(), readAt, "other places have other values");
   });
+  await done();
+});
+
+test("plots and maps of every step are read by keys", async (t) => {
+  const { page, done } = await open(LECTURE);
+  for (let step = 1; step <= 18; step++) await t.test(`step ${step}`, async () => {
+    await showStep(page, step);
+    const said = () => page.evaluate(() => [".readout", ".result"].map((part) => document.querySelector(`#figure ${part}`).textContent).join(" "));
+    const frames = page.locator("#figure [data-frame]"), n = await frames.count();
+    assert.equal(await page.$eval("#figure .readout", (readout) => readout.getAttribute("aria-live")), "polite");
+    for (let k = 0; k < n; k++) {
+      const before = await said();
+      await frames.nth(k).focus();
+      for (const key of ["ArrowRight", "ArrowRight", "Shift+ArrowUp"]) await page.keyboard.press(key);
+      await settled(page);
+      assert.ok(await frames.nth(k).evaluate((framed) => framed === document.activeElement), "the focus stays while the figure is drawn");
+      assert.ok((await frames.nth(k).getAttribute("aria-label")).length > 3);
+      assert.notEqual(await said(), before, `plot ${k + 1} of ${n} is read`);
+      assert.doesNotMatch(await said(), /NaN|undefined|Infinity/);
+      const at = await page.evaluate(() => {
+        const mark = document.querySelector("#figure .overlay .mark").getBoundingClientRect(), box = document.activeElement.getBoundingClientRect();
+        return [(mark.left + mark.width / 2 - box.left) / box.width, (mark.top + mark.height / 2 - box.top) / box.height];
+      });
+      assert.ok(at.every((share) => share > 0 && share < 1), `${at}`);
+      await page.keyboard.press("Escape");
+      await settled(page);
+      assert.equal(await page.locator("#figure .overlay .mark").count(), 0);
+    }
+  });
+  // Enter drags to the mark.
+  await showStep(page, 9);
+  const center = () => page.evaluate(() => Number(document.querySelector("#figure input").value));
+  const before = await center();
+  await page.locator("#figure [data-frame]").first().focus();
+  for (let k = 0; k < 5; k++) await page.keyboard.press("ArrowLeft");
+  await page.keyboard.press("Enter");
+  await settled(page);
+  assert.ok(Math.abs(await center() - before + 0.1) < 0.015, `${before} has become ${await center()}`);
+  await done();
+});
+
+test("a direction is marked in all pictures of a figure", async () => {
+  const { page, done } = await open(LECTURE);
+  const marks = () => page.$$eval("#figure .overlay .mark", (all) => all.map((mark) => { const { left, top, width, height } = mark.getBoundingClientRect(); return [left + width / 2, top + height / 2]; }));
+  const over = async (k, u, v) => {
+    const framed = page.locator("#figure [data-frame]").nth(k);
+    await framed.scrollIntoViewIfNeeded();
+    const box = await framed.boundingBox();
+    await page.mouse.move(box.x + u * box.width, box.y + v * box.height);
+    await settled(page);
+    return [box.x + u * box.width, box.y + v * box.height];
+  };
+  for (const [step, n] of [[2, 1], [3, 1], [4, 2], [6, 1], [7, 1], [12, 3], [14, 1], [15, 1]]) {
+    await showStep(page, step);
+    await over(0, 0.55, 0.35);
+    assert.ok((await marks()).length >= n, `step ${step} has ${(await marks()).length} marks`);
+  }
+  // From the map to the sphere and back.
+  for (const step of [7, 15]) {
+    await showStep(page, step);
+    await page.locator("#figure [data-frame]").nth(1).scrollIntoViewIfNeeded();
+    const [x, y] = await over(0, 0.45, 0.35), [[u, v]] = await marks();
+    await page.mouse.move(u, v);
+    await settled(page);
+    const [[backX, backY]] = await marks();
+    assert.ok(Math.hypot(backX - x, backY - y) < 6, `step ${step}: ${[x, y]} comes back as ${[backX, backY]}`);
+  }
+  await done();
+});
+
+test("color bars say the luminances of maps and hemispheres", async () => {
+  const { page, done } = await open(`${LECTURE}&env=constant`);
+  for (const step of [6, 7, 14, 15]) {
+    await showStep(page, step);
+    const bar = page.locator('#figure [aria-label^="Luminance of the map: L = 0, "]');
+    assert.ok(await bar.isVisible(), `step ${step}`);
+    if (step !== 6) continue;
+    const white = Number(/([\d.]+) or more$/.exec(await bar.getAttribute("aria-label"))[1]);
+    const canvas = page.locator("#figure canvas").first();
+    await canvas.hover({ position: { x: 20, y: 8 } });
+    await page.waitForFunction(() => /^Under the pointer, L = /.test(document.querySelector("#figure .readout").textContent));
+    const light = Number(/L = ([\d.]+)/.exec(await text(page, "#figure .readout"))[1]);
+    const byte = await canvas.evaluate((canvas) => canvas.getContext("2d").getImageData(40, 16, 1, 1).data[1]);
+    // x/(1 + x) to the power 1/2.2, 1.3 times as bright.
+    const of = (share) => ((t) => t / (1 - t))((share / 1.3) ** 2.2);
+    assert.ok(Math.abs(of(byte / 255) / of(1) / (light / white) - 1) < 0.08, `the byte ${byte} is ${light}, and white is ${white}`);
+  }
+  await page.evaluate((hash) => { location.hash = hash; }, `${SMALL}&scene=sphere&pixel=[27,27]&panel=xray&strategy=mis:1:1`);
+  await page.waitForFunction(() => document.querySelectorAll("#hemispheres .colorbar").length === 4);
+  const labels = await page.$$eval("#hemispheres .colorbar", (all) => all.map((bar) => bar.getAttribute("aria-label")));
+  assert.match(labels[0], /^Luminance of light L: [\d.]+, [\d.]+, [\d.]+$/);
+  assert.match(labels[2], /^visibility V: 0, 1$/);
+  // Keys move the mark over all of them, and the map.
+  await page.focus("#hemispheres .marked");
+  await page.keyboard.press("ArrowRight");
+  await page.waitForFunction(() => /^In this direction, L = /.test(document.getElementById("xray-readout").textContent) && document.querySelector("#hemispheres .mark").style.left === "52%");
+  await page.focus("#xray-map .marked");
+  const read = await text(page, "#xray-readout");
+  for (let k = 0; k < 8; k++) await page.keyboard.press("ArrowUp");
+  await page.waitForFunction((read) => document.getElementById("xray-readout").textContent !== read, read);
+  await show(page, "map");
+  await page.waitForSelector("html[data-map]");
+  await page.focus("#map-viewer");
+  for (const key of ["ArrowLeft", "ArrowDown"]) await page.keyboard.press(key);
+  await page.waitForFunction(() => /^In this direction, L = /.test(document.getElementById("map-readout").textContent));
   await done();
 });
 

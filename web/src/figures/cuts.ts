@@ -3,25 +3,27 @@
 import { h, short } from "../dom";
 import { Film, FilmView } from "../film";
 import { plot, type Series } from "../plot";
-import type { Stage } from "../stage";
+import type { Mark, Stage } from "../stage";
 import { isBuiltinProbe } from "../state";
 import type { Point } from "./curves";
 import { sizeOf } from "./lab";
 import { Pictures } from "./pictures";
-import { COLUMNS, HEIGHT, SmallMap, WIDTH, canvas, cosine, direction, dot } from "./small_map";
+import { Ball, COLUMNS, HEIGHT, SmallMap, WIDTH, canvas, cosine, direction, dot, fromBall, onBall, placeOf } from "./small_map";
 
-type Method = "median-cut" | "variance-minimization";
+type Method = "median-cut" | "variance-minimization" | "variance-minimization:2009";
 interface Light { uv: Point; share: number; irradiance: number[] }
 interface Rig { lights: Light[]; diffuse: number; glossy: number }
 
 const percent = (x: number) => `${short(100 * x)} %`;
 
-const NAMES: Record<Method, string> = { "median-cut": "median cut", "variance-minimization": "variance minimization" };
+const NAMES: Record<Method, string> = { "median-cut": "median cut", "variance-minimization": "variance minimization", "variance-minimization:2009": "the rule of 2009" };
+/** The strategy that renders with a method's lights. */
+const strategyOf = (method: Method, n: number) => (method === "variance-minimization:2009" ? `variance-minimization:${n}:rule=2009` : `${method}:${n}`);
 
 /** The statue under the lights of some methods; fewer camera samples where there are many lights. */
 function underLights(stage: Stage, methods: Method[]): Pictures {
   const { env, rows, rotate } = stage.app.state, of = { scene: "statue", material: "", ground: true, probe: env, rows, rotate, hidesEnvironment: false, size: sizeOf(stage.app) };
-  const ways = methods.map((method) => ({ name: NAMES[method], strategy: (n: number) => `${method}:${n}`, samples: (n: number) => Math.max(2, Math.min(16, 512 / n)) }));
+  const ways = methods.map((method) => ({ name: NAMES[method], strategy: (n: number) => strategyOf(method, n), samples: (n: number) => Math.max(2, Math.min(16, 512 / n)) }));
   return new Pictures(stage, of, ways, "A statue", "the whole probe");
 }
 
@@ -68,7 +70,7 @@ class Part {
   /** The centroid on the sphere. */
   get place(): Point {
     const [x, y, z] = this.sphere, length = Math.hypot(x, y, z) || 1;
-    return [(Math.atan2(z, x) / (2 * Math.PI) + 1) % 1, Math.acos(y / length) / Math.PI];
+    return placeOf([x / length, y / length, z / length]);
   }
 }
 
@@ -107,14 +109,14 @@ class Spheres {
   private views: [FilmView, HTMLElement][];
   readonly element: HTMLElement;
 
-  constructor(names: string[]) {
+  constructor(ball: Ball, names: string[]) {
     const figures = names.map((name) => {
-      const element = h("canvas", { width: String(SPHERE), height: String(SPHERE), role: "img", "aria-label": `A matte sphere under ${name}` });
+      const element = h("canvas", { width: String(SPHERE), height: String(SPHERE), role: "img", "aria-label": `A matte sphere under ${name}`, "data-frame": JSON.stringify({ left: 0, right: SPHERE, top: 0, bottom: SPHERE, xs: [-1, 1], ys: [-1, 1] }) });
       const caption = h("figcaption", {}, name);
       return { view: new FilmView(element, false), caption, figure: h("figure", {}, element, caption) };
     });
     this.views = figures.map(({ view, caption }) => [view, caption]);
-    this.element = h("div", { class: "spheres" }, ...figures.map(({ figure }) => figure));
+    this.element = h("div", { class: "spheres" }, ball.element, ...figures.map(({ figure }) => figure));
   }
 
   show(films: Film[], captions: string[]) {
@@ -129,24 +131,46 @@ class Spheres {
 /** Pixels along an edge of a sphere's picture, which is drawn twice as large: matte shading is smooth, and the rim is cut. */
 const SPHERE = 80;
 
+/** A place of the map after a turn of the light [degrees]. */
+const turned = ([u, v]: Point, by: number): Point => [((u - by / 360) % 1 + 1) % 1, v];
+
+/** The place on the map that is pointed at, there, on the sphere of directions, or on a matte sphere, where it faces. The
+ *  matte spheres stand under the light as it is turned. */
+function placeAt({ frame, x, y }: Mark, turn: number): Point | null {
+  if (frame === 0) return [x, y];
+  const r = Math.hypot(x, y);
+  return frame === 1 ? fromBall([x, y]) : r < 1 ? turned(placeOf([x, y, Math.sqrt(1 - r * r)]), -turn) : null;
+}
+
+/** The marks of a place in all pictures but the one that is pointed at; matte spheres are seen from +z. */
+function marksOf({ frame }: Mark, place: Point, turn: number): Mark[] {
+  const [x, y, z] = direction(turned(place, turn)), ahead = z > 0 ? [2, 3, 4].map((frame) => ({ frame, x, y })) : [], [u, v] = onBall(place);
+  return [{ frame: 0, x: place[0], y: place[1] }, { frame: 1, x: u, y: v }, ...ahead].filter((mark) => mark.frame !== frame);
+}
+const texelOf = ([x, y]: Point) => Math.min(Math.floor(y * HEIGHT), HEIGHT - 1) * WIDTH + Math.min(Math.floor(x * WIDTH), WIDTH - 1);
+
 /** A method's lights of the map, shown with those of the other method. */
 export const cuts = (method: Method, other: Method) => (stage: Stage) => {
   const isMinimized = method === "variance-minimization";
   const rounds = stage.player("Lights", 0, 9, 4, (k) => String(2 ** k));
   const shown = stage.choice("Show", [["map", "regions on the map"], ["lights", "the lights alone"], ...(isBuiltinProbe(stage.app.state.env) ? [["pictures", "pictures under the lights"] as [string, string]] : [])]);
   const refined = isMinimized ? stage.choice("Regions", [["refined", "joined and moved"], ["rectangles", "rectangles"], ["2009", "rectangles, by the rule of 2009"]]) : () => "refined";
-  /** The method with its rule, and its name. */
-  const own = (): [string, string] => (refined() === "2009" ? [`${method}:2009`, "the rule of 2009"] : [method, NAMES[method]]);
+  /** The method with its rule. */
+  const own = (): Method => (refined() === "2009" ? "variance-minimization:2009" : method);
   const by = stage.choice("Cut", [["method", `by ${NAMES[method]}`], ["hand", "once, by hand"]]);
   const hand = stage.slider("Cut at", 0.05, 0.95, 0.005, 0.6);
-  let map: SmallMap | null = null, held: { texel: number } | null = null, first: FirstCut | null = null, spheres: Spheres | null = null;
+  const ball = new Ball();
+  const spheres = new Spheres(ball, isMinimized ? ["the probe", "variance minimization", "median cut"] : []);
+  let map: SmallMap | null = null, held: { texel: number } | null = null, first: FirstCut | null = null;
   // Dragging moves the cut, or holds a region, to compare it while the lights play.
   let pictures: Pictures | null = null;
   const pointed = stage.pointer((at) => {
-    const { x, y } = at;
     if (by() !== "hand" && shown() === "pictures") pictures?.drag(at);
-    else if (by() === "hand") hand.set(Math.min(Math.max(x, 0.05), 0.95));
-    else held = { texel: Math.floor(y * HEIGHT) * WIDTH + Math.floor(x * WIDTH) };
+    else if (by() === "hand") hand.set(Math.min(Math.max(at.x, 0.05), 0.95));
+    else {
+      const place = placeAt(at, stage.app.state.rotate);
+      if (place) held = { texel: texelOf(place) };
+    }
   });
   let known: { key: string; rig: Rig; beside: Rig; regions: Uint32Array; films: Film[] } | null = null;
   const divide = async (n: number) => {
@@ -158,7 +182,7 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
       const both = isMinimized ? (await engines.call("spheres", settings(name), SPHERE, 0)) as Float32Array : new Float32Array(), size = both.length / 2;
       return [rig, size ? [0, 1].map((k) => Film.fromRgb(SPHERE, SPHERE, both.subarray(k * size, (k + 1) * size))) : []];
     };
-    const [rule] = own(), [beside, besideFilms] = await ask(other), [rig, films] = await ask(rule);
+    const rule = own(), [beside, besideFilms] = await ask(other), [rig, films] = await ask(rule);
     const regions = (await engines.call("regions", settings(rule), WIDTH)) as Uint32Array;
     return (known = { key, rig, beside, regions, films: [...films, ...besideFilms.slice(1)] });
   };
@@ -184,8 +208,9 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
     ];
     stage.svg(plot([...series, { name: "", kind: "shade", points: vertical(x) }], {
       x: { name: "place of the cut; drag it here or on the map", range: [0, 1] }, y: { name: isMinimized ? "variance, relative to the uncut map" : "share", range: [0, 1.05] }, height: 190,
-    }), "What a cut leaves on each side, over its place", context.canvas as HTMLCanvasElement);
+    }), "What a cut leaves on each side, over its place", context.canvas as HTMLCanvasElement, map.bar);
     const over = pointed();
+    if (over) stage.mark({ frame: 1 - over.frame, x: over.x, y: over.frame === 0 ? 0 : 0.5 });
     stage.read(over ? `A cut at ${over.x.toFixed(2)} leaves ${percent(first.at(over.x)[0].energy / whole.energy)} of the light on its left.` : null);
     const [a, b] = halves, shares = `At ${x.toFixed(2)}, ${percent(a.energy / whole.energy)} of the light is left of the cut and ${percent(b.energy / whole.energy)} right of it`;
     const at = (p: Point) => `${p[0].toFixed(2)}`;
@@ -199,34 +224,37 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
     map ??= await SmallMap.of(stage);
     if (isByHand) return drawHand(map);
     if (shown() === "pictures") {
-      const methods = isMinimized ? [method, other] : [method], errors = await (pictures ??= underLights(stage, methods)).draw(n, pointed(), () => shown() === "pictures" && n === 2 ** rounds() && by() !== "hand");
-      if (errors) stage.say(`The picture’s relative RMSE with ${n} light${n > 1 ? "s" : ""} is ${errors.map((error, i) => `${percent(error)} by ${NAMES[methods[i]]}`).join(" and ")}. Each light casts a hard shadow of its own, so few lights show as steps; at edges, the noise of the camera’s samples counts, too.`);
+      // What the step explains, and what became of it.
+      const methods: Method[] = isMinimized ? [other, "variance-minimization:2009", method] : [method], errors = await (pictures ??= underLights(stage, methods)).draw(n, pointed(), () => shown() === "pictures" && n === 2 ** rounds() && by() !== "hand");
+      if (errors) stage.say(`The picture’s relative RMSE with ${n} light${n > 1 ? "s" : ""} is ${errors.map((error, i) => `${percent(error)} by ${NAMES[methods[i]]}`).join(", ")}. Each light casts a hard shadow of its own, so few lights show as steps; at edges, the noise of the camera’s samples counts, too.`);
       return;
     }
-    const { rig, beside, regions, films } = await divide(n), over = pointed();
+    const { rig, beside, regions, films } = await divide(n), at = pointed(), over = at && placeAt(at, stage.app.state.rotate);
     const isAlone = shown() === "lights", context = canvas(stage, isAlone ? `${n} lights` : `The map in ${n} regions`);
-    const at = over ? Math.min(Math.floor(over.y * HEIGHT), HEIGHT - 1) * WIDTH + Math.min(Math.floor(over.x * WIDTH), WIDTH - 1) : held?.texel;
-    const chosen = at === undefined ? -1 : regions[at];
-    if (isAlone) drawLights(context, rig.lights);
-    else {
+    const chosen = over ? regions[texelOf(over)] : held ? regions[held.texel] : -1;
+    ball.paint(isAlone ? null : map);
+    if (isAlone) {
+      context.fillStyle = "#000";
+      context.fillRect(0, 0, WIDTH, HEIGHT);
+    } else {
       map.paint(context);
       drawRegions(context, regions, chosen);
-      for (const { uv, share } of rig.lights) dot(context, uv, 2 + 8 * Math.sqrt(share), "#ffd34d");
     }
-    const drawing: HTMLElement[] = [context.canvas as HTMLCanvasElement];
-    if (isMinimized) {
-      spheres ??= new Spheres(["the probe", "variance minimization", "median cut"]);
-      spheres.show(films, ["the whole probe", `${own()[1]}: error ${percent(rig.diffuse)}`, `${NAMES[other]}: ${percent(beside.diffuse)}`]);
-      drawing.push(spheres.element);
+    for (const { uv, share, irradiance } of rig.lights) {
+      const radius = 2 + 8 * Math.sqrt(share), style = isAlone ? colorOf(irradiance) : "#ffd34d";
+      dot(context, uv, radius, style);
+      ball.dot(uv, radius, style);
     }
-    stage.drawing.replaceChildren(...drawing);
+    if (isMinimized) spheres.show(films, ["the whole probe", `${NAMES[own()]}: error ${percent(rig.diffuse)}`, `${NAMES[other]}: ${percent(beside.diffuse)}`]);
+    stage.fill(context.canvas as HTMLCanvasElement, map.bar, spheres.element);
+    if (at && over) stage.mark(...marksOf(at, over, stage.app.state.rotate));
     const near = aroundBrightest(rig.lights);
     const place = (i: number) => regions[2 * Math.floor(i / COLUMNS) * WIDTH + 2 * (i % COLUMNS)];
     const area = chosen < 0 ? 0 : regions.reduce((sum, label, i) => sum + (label === chosen ? Math.sin(Math.PI * (Math.floor(i / WIDTH) + 0.5) / HEIGHT) : 0), 0) * Math.PI / (4 * HEIGHT * HEIGHT);
-    stage.read(chosen < 0 ? null : `${over ? `${map.read([over.x, over.y])}; its` : "The"} region holds ${percent(map.share((i) => place(i) === chosen))} of the light in ${percent(area)} of the directions.`);
+    stage.read(chosen < 0 ? null : `${over ? `${map.read(over)}; its` : "The"} region holds ${percent(map.share((i) => place(i) === chosen))} of the light in ${percent(area)} of the directions.`);
     const brightest = near.count > 1 ? `the ${near.count} lights within 2° of the brightest hold` : "the brightest holds";
     stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}; ${brightest} ${percent(near.share)} of its energy. The shading error is ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; with ${NAMES[other]}, ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
-    if (isMinimized) stage.answer(answerOf(n, rig, beside, stage.app.envName, own()[1]));
+    if (isMinimized) stage.answer(answerOf(n, rig, beside, stage.app.envName, NAMES[own()]));
   });
 };
 
@@ -241,14 +269,10 @@ function drawRegions(context: CanvasRenderingContext2D, regions: Uint32Array, ch
   });
 }
 
-/** Draws lights in their colors, brighter ones larger. */
-function drawLights(context: CanvasRenderingContext2D, lights: Light[]) {
-  context.fillStyle = "#000";
-  context.fillRect(0, 0, WIDTH, HEIGHT);
-  for (const { uv, share, irradiance } of lights) {
-    const most = Math.max(...irradiance, 1e-9);
-    dot(context, uv, 2 + 8 * Math.sqrt(share), `rgb(${irradiance.map((c) => Math.round(255 * Math.max(c / most, 0) ** (1 / 2.2))).join(" ")})`);
-  }
+/** The color of a light, as bright as can be shown. */
+function colorOf(irradiance: number[]): string {
+  const most = Math.max(...irradiance, 1e-9);
+  return `rgb(${irradiance.map((c) => Math.round(255 * Math.max(c / most, 0) ** (1 / 2.2))).join(" ")})`;
 }
 
 /** Which method has the smaller shading error, as the figure shows it. */

@@ -1,5 +1,6 @@
 // Step 9, on the sphere: the importance functions of a pixel with their samples, and pictures that follow from two of them.
 
+import { colorBar } from "../direction";
 import { color, h, short } from "../dom";
 import { FilmView } from "../film";
 import { pixels, type Pointed } from "../pointer";
@@ -31,6 +32,7 @@ export class Importance {
   private at: [number, number];
   private pictures: { view: FilmView; canvas: HTMLCanvasElement; mark: CanvasRenderingContext2D; caption: HTMLElement }[];
   private discs: CanvasRenderingContext2D[];
+  private bars = FUNCTIONS.map(() => h("div"));
   readonly element: HTMLElement;
   private known = { pixel: "", layers: null as MapPicture | null };
   private rendered = new Map<string, Rendered>();
@@ -45,7 +47,7 @@ export class Importance {
     });
     this.discs = FUNCTIONS.map(({ name }) => canvas(DISC, `The importance function of ${name} and its samples`, TEXELS).getContext("2d")!);
     const images = this.pictures.map(({ canvas, mark, caption }) => figure(h("div", { class: "marked" }, canvas, mark.canvas as HTMLCanvasElement), caption));
-    this.element = h("div", { class: "importance" }, h("div", { class: "pictures" }, ...images), h("div", { class: "discs" }, ...this.discs.map((disc, i) => figure(disc.canvas as HTMLCanvasElement, h("figcaption", {}, `density of the ${FUNCTIONS[i].name}`)))));
+    this.element = h("div", { class: "importance" }, h("div", { class: "pictures" }, ...images), h("div", { class: "discs" }, ...this.discs.map((disc, i) => figure(disc.canvas as HTMLCanvasElement, this.bars[i], h("figcaption", {}, `density of the ${FUNCTIONS[i].name} [sr⁻¹]`)))));
   }
 
   /** Picks the pixel under the pointer. */
@@ -59,8 +61,8 @@ export class Importance {
     const layers = this.known.layers!, samples: Float32Array[] = [];
     for (const { strategy } of FUNCTIONS) samples.push((await lab.ask(of, "samples", pixel, strategy, "angular", n, 1)) as Float32Array);
     const place = over && over.frame >= PICTURES.length ? [over.x / TEXELS, over.y / TEXELS] : null;
-    FUNCTIONS.forEach(({ layer, kind }, i) => this.disc(this.discs[i], layers, layer, samples[i], color(kind), place));
-    if (!this.element.isConnected) this.stage.drawing.replaceChildren(this.element);
+    FUNCTIONS.forEach(({ layer, kind }, i) => this.disc(i, layers, layer, samples[i], color(kind), place));
+    this.stage.fill(this.element);
     this.read(layers, place, over);
     const truth = await lab.truth(of), errors: number[] = [];
     for (const [i, { strategy }] of PICTURES.entries()) {
@@ -89,13 +91,15 @@ export class Importance {
   }
 
   /** Draws a density and its samples; brighter is larger, full at its 99th percentile, or else a lamp would hide the rest. */
-  private disc(context: CanvasRenderingContext2D, { width, pixels }: MapPicture, layer: number, samples: Float32Array, style: string, place: number[] | null) {
+  private disc(k: number, { width, pixels }: MapPicture, layer: number, samples: Float32Array, style: string, place: number[] | null) {
+    const context = this.discs[k];
     context.fillStyle = "#000";
     context.fillRect(0, 0, DISC, DISC);
     if (!width) return;
     const n = width * width, density = pixels.subarray(layer * n, (layer + 1) * n), sorted = density.filter((p) => p > 0).sort();
     const most = sorted[Math.floor(0.99 * (sorted.length - 1))] || 1, small = h("canvas", { width: String(width), height: String(width) }), inner = small.getContext("2d")!;
     const image = inner.createImageData(width, width);
+    colorBar(this.bars[k], `Density of the ${FUNCTIONS[k].name}`, "linear-gradient(to right, #000, rgb(200 200 200))", [[0, "0"], [1, `${short(Number(most.toPrecision(2)))} or more`]]);
     density.forEach((p, i) => image.data.fill(200 * Math.sqrt(Math.min(p / most, 1)), 4 * i, 4 * i + 3).fill(255, 4 * i + 3, 4 * i + 4));
     inner.putImageData(image, 0, 0);
     context.drawImage(small, 0, 0, DISC, DISC);

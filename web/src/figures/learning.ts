@@ -32,7 +32,7 @@ export const learning = (stage: Stage) => {
       [5, { name: "", kind: "shade", points: at === undefined ? [] : [[at, 0], [at, 1.08]] }],
     ];
     const main = plot(series.filter(([from]) => from <= upTo).map(([, s]) => s), { x: { name: "direction, drag the shadow’s edge", range: [0, 1] }, y: { name: "relative to the maximum", range: [-0.06, 1.08], ticks: [0, 0.5, 1] }, height: 260, presented: 330 });
-    const chance = plot([{ name: "probability of a ray", kind: "estimate", as: "area", points: steps((k) => (upTo < 5 ? 0 : pixel.probability(pixel.strata[k].center, rays()))) }],
+    const chance = plot([{ name: "probability of a ray", kind: "estimate", as: "area", points: steps((k) => (upTo < 5 ? 0 : pixel.probability(pixel.strata[k].center, rays()))) }, { name: "", kind: "shade", points: at === undefined ? [] : [[at, 0], [at, 1]] }],
       { x: { name: "direction", range: [0, 1] }, y: { name: "π", range: [0, 1], ticks: [0, 1] }, height: 120, presented: 150 });
     stage.svg(main + chance, "The product of light and reflectance in strata, what is known of its visibility, and where rays go");
     const total = pixel.total, exact = pixel.shadowed, m = pixel.expected(rays()), relative = (variance: number) => percentage(Math.sqrt(variance) / exact);

@@ -1,9 +1,9 @@
 // Steps 2 to 4: lobes, their samples, and the reflection of half vectors.
 
 import { short } from "../dom";
-import { figureWidth, framed, isPresenting, type Series } from "../plot";
+import { figureWidth, framed, isPresenting, plot, type Series } from "../plot";
 import { pixels } from "../pointer";
-import type { Stage } from "../stage";
+import type { Mark, Stage } from "../stage";
 import type { Point } from "./curves";
 
 const RADIANS = Math.PI / 180;
@@ -38,6 +38,15 @@ function polar(series: Series[], directions: [[number, string], [number, string]
   return `<svg viewBox="0 0 ${width} ${height}"${framed(pixels(width, height))} aria-hidden="true">${rings.join("")}<path class="axis" d="M20 ${y0}H${width - 20}"/>${arrows.join("")}${curves.join("")}${legend.join("")}</svg>`;
 }
 
+/** How far a direction may be from the plane of incidence to be marked in it [degrees]. */
+const IN_PLANE = 4;
+
+/** A direction at the rim of a polar plot. */
+const markPolar = (frame: number, angle: number): Mark => {
+  const { x0, y0, radius } = polarPlace();
+  return { frame, x: x0 + radius * Math.sin(angle), y: y0 - radius * Math.cos(angle) };
+};
+
 export const lobes = (stage: Stage) => {
   const exponent = stage.slider("Exponent n", 1, 200, 1, 20);
   const angle = stage.slider("Viewer", 0, 85, 1, 40, (x) => `${x}°`);
@@ -67,7 +76,14 @@ export const lobes = (stage: Stage) => {
     if (at?.frame === 0) {
       const t = polarAngle(at), i = Math.min(Math.max(Math.floor((t / 180 + 0.5) * n), 0), n - 1);
       stage.read(`${Math.round(Math.abs(t))}° from the normal on the ${t < 0 ? "viewer’s" : "mirror’s"} side: Phong ${short(series[0].points[i][1])}, cosine ${short(series[1].points[i][1])} per steradian.`);
-    } else stage.read(at && readDirection(at, view));
+      stage.mark(markAbove(1, polarDirection({ theta: t, phi: 0 }), view));
+    } else if (at) {
+      const { theta: t, phi } = directionAt(at, view), [x, y, z] = polarDirection({ theta: t, phi });
+      const toMirror = Math.max(x * Math.sin(theta) + z * Math.cos(theta), 0), power = exponent();
+      stage.read(t > 90 ? null : `θ = ${Math.round(t)}°, φ = ${Math.round(phi)}°: Phong ${short((power + 1) / (2 * Math.PI) * toMirror ** power)}, cosine ${short(z / Math.PI)} per steradian.`);
+      // The plot above is of the plane of incidence.
+      if (t <= 90 && Math.abs(Math.asin(y)) < IN_PLANE * RADIANS) stage.mark(markPolar(0, Math.atan2(x, z)));
+    } else stage.read(null);
     stage.say(`The maximum density is ${short(peak)} per steradian; ${short(100 * (1 - kept / 2000))} % of the Phong samples are below the surface. ${samples.length / 3} of ${count} samples are above it; the lower picture shows them from above.`);
   });
 };
@@ -85,9 +101,16 @@ function directionAt({ x, y }: { x: number; y: number }, [x0, y0, radius]: Vecto
   return { theta: 90 * Math.hypot(x - x0, y - y0) / radius, phi: Math.atan2(y0 - y, x - x0) / RADIANS };
 }
 
-const readDirection = (at: { x: number; y: number }, view: Vector) => {
-  const { theta, phi } = directionAt(at, view);
-  return theta > 90 ? null : `Under the pointer, θ = ${Math.round(theta)}°, φ = ${Math.round(phi)}°.`;
+/** A direction by its polar angle and azimuth [degrees]. */
+const polarDirection = ({ theta, phi }: { theta: number; phi: number }): Vector => {
+  const [t, p] = [theta * RADIANS, phi * RADIANS];
+  return [Math.sin(t) * Math.cos(p), Math.sin(t) * Math.sin(p), Math.cos(t)];
+};
+
+/** The place of a direction in a hemisphere seen from above, as a mark in a picture of the figure. */
+const markAbove = (frame: number, direction: Vector, view: Vector): Mark => {
+  const [x, y] = fromAbove(direction, view);
+  return { frame, x, y };
 };
 
 /** A hemisphere from above with sampled directions, and the viewer and the mirror direction at an angle. */
@@ -106,10 +129,11 @@ function fromAboveSvg(view: Vector, samples: Float32Array, theta: number): strin
 }
 
 /** The center and radius of a hemisphere from above, with `above` as the space on top. */
-const hemisphere = (above: number, isAlone = false): Vector => {
-  const radius = !isPresenting() ? 150 : isAlone ? 215 : 105;
+const hemisphere = (above: number, radius = isPresenting() ? 105 : 150): Vector => {
   return [figureWidth() / 2, above + radius + 22, radius];
 };
+/** That of step 3, which has more room. */
+const wardView = () => hemisphere(0, isPresenting() ? 140 : 150);
 
 /** Rings at 30°, 60° and 90° from the normal, with the axes x and y. */
 function rings([x0, y0, radius]: Vector): string {
@@ -121,22 +145,66 @@ function rings([x0, y0, radius]: Vector): string {
     <text x="${x0 + radius + 8}" y="${y0 + 4}">x</text><text x="${x0}" y="${y0 - radius - 6}" text-anchor="middle">y</text>`;
 }
 
+/** The polar angle and the azimuth of a direction [degrees]. */
+const anglesOf = ([x, y, z]: Vector) => ({ theta: Math.atan2(Math.hypot(x, y), z) / RADIANS, phi: Math.atan2(y, x) / RADIANS });
+const unit = (v: Vector) => v.map((c) => c / Math.hypot(...v)) as Vector;
+const scalar = (a: Vector, b: Vector) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+/** A direction mirrored about a half vector. */
+const mirrored = (wo: Vector, wh: Vector) => wh.map((c, k) => 2 * scalar(wo, wh) * c - wo[k]) as Vector;
+const halfOf = (wi: Vector, wo: Vector) => unit(wi.map((c, k) => c + wo[k]) as Vector);
+
+/** What samples become if the arc tangent is not put into its quadrant: half vectors at x < 0 turn by 180°. */
+function withoutQuadrants(samples: Float32Array, wo: Vector): Float32Array {
+  const all: number[] = [];
+  for (let i = 0; i < samples.length; i += 3) {
+    const [x, y, z] = halfOf([...samples.subarray(i, i + 3)] as Vector, wo), wi = mirrored(wo, x < 0 ? [-x, -y, z] : [x, y, z]);
+    if (wi[2] > 0) all.push(...wi);
+  }
+  return Float32Array.from(all);
+}
+
 export const ward = (stage: Stage) => {
   const ax = stage.slider("α along x", 0.02, 0.8, 0.01, 0.3);
   const ay = stage.slider("α along y", 0.02, 0.8, 0.01, 0.08);
   const angle = stage.slider("Viewer", 0, 80, 1, 30, (x) => `${x}°`);
   const falling = stage.player("Samples", 0, 12, 11, doubled);
-  const pointed = stage.pointer((at) => angle.set(Math.min(Math.round(directionAt(at, hemisphere(0, true)).theta), 80)));
+  const azimuth = stage.choice("Azimuth", [["quadrant", "in the quadrant of 2πu"], ["arctan", "the arc tangent alone (wrong)"]]);
+  const pointed = stage.pointer((at) => { if (at.frame === 0) angle.set(Math.min(Math.round(directionAt(at, wardView()).theta), 80)); });
   stage.draw(async () => {
-    const samples = (await stage.app.engines.call("lobeSamples", `ward:${ax()}:${ay()}:1`, angle(), 2 ** falling(), 1)) as Float32Array;
-    const view = hemisphere(0, true);
-    let [sx, sy, mx] = [0, 0, 0];
+    const all = (await stage.app.engines.call("lobeSamples", `ward:${ax()}:${ay()}:1`, angle(), 2 ** falling(), 1)) as Float32Array;
+    const view = wardView(), radians = angle() * RADIANS, wo: Vector = [-Math.sin(radians), 0, Math.cos(radians)];
+    const samples = azimuth() === "quadrant" ? all : withoutQuadrants(all, wo);
+    let [sx, sy, mx, ahead] = [0, 0, 0, 0];
     const n = Math.max(samples.length / 3, 1);
-    for (let i = 0; i < samples.length; i += 3) [sx, sy, mx] = [sx + samples[i] ** 2, sy + samples[i + 1] ** 2, mx + samples[i]];
-    stage.svg(fromAboveSvg(view, samples, angle() * RADIANS), "Directions sampled from Ward’s lobe, seen from above");
-    const at = pointed();
-    stage.read(at && readDirection(at, view));
-    stage.say(`Standard deviation of ${n} directions: ${short(Math.sqrt(Math.max(sx / n - (mx / n) ** 2, 0)))} along x, ${short(Math.sqrt(sy / n))} along y. The rings are 30°, 60° and 90° from the normal; drag the viewer.`);
+    for (let i = 0; i < samples.length; i += 3) {
+      [sx, sy, mx] = [sx + samples[i] ** 2, sy + samples[i + 1] ** 2, mx + samples[i]];
+      ahead += Number(halfOf([...samples.subarray(i, i + 3)] as Vector, wo)[0] >= 0);
+    }
+    // The density of half vectors, which is as high for all azimuths at θh = 0.
+    const density = (theta: number, phi: number) => {
+      const [c, s] = [Math.cos(phi * RADIANS) / ax(), Math.sin(phi * RADIANS) / ay()], t = Math.tan(theta * RADIANS);
+      return theta < 90 ? Math.exp(-t * t * (c * c + s * s)) / (Math.PI * ax() * ay() * Math.cos(theta * RADIANS) ** 3) : 0;
+    };
+    const along = (phi: number): Point[] => Array.from({ length: 181 }, (_, i) => [i / 2, density(i / 2, phi)]);
+    const at = pointed(), isAbove = at?.frame === 0, { theta: t, phi } = isAbove ? directionAt(at, view) : { theta: 0, phi: 0 };
+    const half = isAbove && t <= 90 ? anglesOf(halfOf(polarDirection({ theta: t, phi }), wo)) : null;
+    const densities = plot([
+      { name: "along x", kind: "lobe", points: along(0) }, { name: "along y", kind: "light", points: along(90) },
+      { name: "", kind: "shade", points: half ? [[half.theta, 0], [half.theta, density(half.theta, half.phi)]] : [] },
+    ], { x: { name: "θh [degrees]", range: [0, 90], ticks: [0, 30, 60, 90] }, y: { name: "p(ωh) per steradian" }, height: 170, presented: 165 });
+    stage.svg(fromAboveSvg(view, samples, radians) + densities, "Directions sampled from Ward’s lobe, seen from above, and the density of its half vectors");
+    if (half) {
+      stage.read(`θ = ${Math.round(t)}°, φ = ${Math.round(phi)}°: the half vector is at θh = ${Math.round(half.theta)}°, φh = ${Math.round(half.phi)}°, where p(ωh) = ${short(density(half.theta, half.phi))}.`);
+      stage.mark({ frame: 1, x: half.theta, y: density(half.theta, half.phi) });
+    } else if (at?.frame === 1) {
+      stage.read(`θh = ${Math.round(at.x)}°: p(ωh) = ${short(density(at.x, 0))} along x, ${short(density(at.x, 90))} along y.`);
+      // Their directions, both ways along each axis.
+      for (const turn of [0, 90, 180, 270]) {
+        const wi = mirrored(wo, polarDirection({ theta: at.x, phi: turn }));
+        if (wi[2] > 0) stage.mark(markAbove(0, wi, view));
+      }
+    } else stage.read(null);
+    stage.say(`Standard deviation of ${n} directions: ${short(Math.sqrt(Math.max(sx / n - (mx / n) ** 2, 0)))} along x, ${short(Math.sqrt(sy / n))} along y. ${short(100 * ahead / n)} % of their half vectors are at x ≥ 0.`);
   });
 };
 
@@ -171,8 +239,7 @@ export const halfVectors = (stage: Stage) => {
       <text class="name" x="${x}" y="${y}" text-anchor="end">viewer</text>
       <path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">half vectors, every 5°</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">directions, every 10°</text></svg>`;
     const view = patches(), wo: Vector = [Math.sin(o), 0, Math.cos(o)];
-    const dot = (a: Vector, b: Vector) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    const mirror = (h: Vector) => h.map((c, k) => 2 * dot(wo, h) * c - wo[k]) as Vector;
+    const mirror = (h: Vector) => mirrored(wo, h);
     const factors: number[] = [];
     const drawn = PATCHES.flatMap(([theta, phi]) => {
       const [st, ct, sp, cp] = [Math.sin(theta * radians), Math.cos(theta * radians), Math.sin(phi * radians), Math.cos(phi * radians)];
@@ -183,27 +250,30 @@ export const halfVectors = (stage: Stage) => {
         return middle.map((m, j) => c * m + a * u[j] + b * v[j]) as Vector;
       });
       const path = (points: Vector[], kind: string) => `<path class="${kind} patch" d="M${points.map((p) => fromAbove(p, view).map((t) => t.toFixed(1)).join(" ")).join("L")}Z"/>`;
-      const mirrored = rim.map(mirror), growth = 4 * dot(middle, wo);
+      const image = rim.map(mirror), growth = 4 * scalar(middle, wo);
       const shown = path(rim, "second");
       // Patches partly below the surface are not reflected.
-      if (growth <= 0 || mirrored.some((p) => p[2] < 0)) return [shown];
+      if (growth <= 0 || image.some((p) => p[2] < 0)) return [shown];
       factors.push(growth);
       const [x, y] = fromAbove(mirror(middle), view);
-      return [path(mirrored, "first"), shown, `<text class="name halo" x="${x.toFixed(1)}" y="${(y + 4).toFixed(1)}" text-anchor="middle">× ${growth.toFixed(1)}</text>`];
+      return [path(image, "first"), shown, `<text class="name halo" x="${x.toFixed(1)}" y="${(y + 4).toFixed(1)}" text-anchor="middle">× ${growth.toFixed(1)}</text>`];
     });
     const [vx, vy] = fromAbove(wo, view);
     const above = `<svg viewBox="0 0 ${width} ${view[1] + view[2] + 8}"${framed(pixels(width, view[1] + view[2] + 8))} aria-hidden="true">${rings(view)}${drawn.join("")}<circle class="axis" cx="${vx}" cy="${vy}" r="5"/><text class="name halo" x="${vx}" y="${vy + 20}" text-anchor="middle">viewer</text>
       <path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">patches of half vectors</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">reflected patches, × magnification</text></svg>`;
+    const inPlane = ([x, , z]: Vector, length: number): Mark => ({ frame: 0, x: x0 + length * Math.sin(Math.atan2(x, z)), y: y0 - length * Math.cos(Math.atan2(x, z)) });
     /** The half vector and the magnification of the direction under the pointer. */
     const readHalf = () => {
       const at = pointed();
       if (!at) return null;
       const { theta, phi } = at.frame === 0 ? { theta: planeAngle(at), phi: 0 } : directionAt(at, view);
       if (Math.abs(theta) > 90) return null;
-      const [t, p] = [theta * radians, phi * radians], wi: Vector = [Math.sin(t) * Math.cos(p), Math.sin(t) * Math.sin(p), Math.cos(t)];
-      const half = wi.map((c, k) => c + wo[k]) as Vector, length = Math.hypot(...half);
-      const wh = half.map((c) => c / length) as Vector;
-      return `Direction at ${Math.round(Math.abs(theta))}° from the normal: half vector at ${Math.round(Math.acos(Math.min(wh[2], 1)) / radians)}°, 4 ωh·ωi = ${short(4 * dot(wh, wi))}.`;
+      const wi = polarDirection({ theta, phi }), wh = halfOf(wi, wo), half = anglesOf(wh);
+      if (at.frame === 0) stage.mark(markAbove(1, wi, view), markAbove(1, wh, view));
+      // The plot above is of the plane of incidence.
+      else if (Math.abs(Math.asin(wi[1])) < IN_PLANE * RADIANS) stage.mark(inPlane(wi, r), inPlane(wh, 0.4 * r));
+      if (at.frame === 1) stage.mark(markAbove(1, wh, view));
+      return `Direction at ${Math.round(Math.abs(theta))}° from the normal: half vector at ${Math.round(half.theta)}°, 4 ωh·ωi = ${short(4 * scalar(wh, wi))}.`;
     };
     stage.svg(plane + above, "Half vectors and their reflected directions, in the plane of incidence and from above");
     stage.read(readHalf());

@@ -69,10 +69,11 @@ export class Pictures {
       view.set({ divider: this.border });
       caption.textContent = i < errors.length ? `${name}: error ${percentage(errors[i])}` : name;
     });
-    if (!this.element.isConnected) this.stage.drawing.replaceChildren(this.element);
+    this.stage.fill(this.element);
   }
 
   private read(over: Pointed | null, films: Film[]) {
+    if (over) this.stage.mark(...this.figures.flatMap((_, frame) => (frame === over.frame ? [] : [{ ...over, frame }])));
     const { size } = this.of, at = over && 4 * (Math.min(Math.floor(over.y), size - 1) * size + Math.min(Math.floor(over.x), size - 1));
     this.stage.read(over && at !== null && films[over.frame] ? `Under the pointer, ${this.figures[over.frame].name} gives ${short(luminance(films[over.frame].pixels, at))}, ${this.reference} ${short(luminance(films.at(-1)!.pixels, at))}; drag to uncover it.` : null);
   }

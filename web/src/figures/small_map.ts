@@ -1,5 +1,6 @@
 // The light probe as the lecture's figures draw and read it.
 
+import { colorBar } from "../direction";
 import { h, short } from "../dom";
 import { Film } from "../film";
 import type { Frame } from "../pointer";
@@ -13,11 +14,10 @@ export const COLUMNS = 320;
 
 /** The figure's map, cleared; its units are columns and rows of the whole, from 0 to 1. */
 export function canvas(stage: Stage, label: string): CanvasRenderingContext2D {
-  let element = stage.drawing.querySelector("canvas");
+  let element = stage.drawing.querySelector<HTMLCanvasElement>("canvas.map");
   if (!element) {
     const frame: Frame = { left: 0, right: WIDTH, top: 0, bottom: HEIGHT, xs: [0, 1], ys: [1, 0] };
-    element = h("canvas", { width: String(WIDTH), height: String(HEIGHT), role: "img", "data-frame": JSON.stringify(frame) });
-    stage.drawing.replaceChildren(element);
+    element = h("canvas", { class: "map", width: String(WIDTH), height: String(HEIGHT), role: "img", "data-frame": JSON.stringify(frame) });
   }
   element.setAttribute("aria-label", label);
   const context = element.getContext("2d")!;
@@ -25,9 +25,23 @@ export function canvas(stage: Stage, label: string): CanvasRenderingContext2D {
   return context;
 }
 
+/** The byte of light, scaled to a middle of 1, and the light of a byte's share of white. */
+const toByte = (x: number) => 255 * WHITE * (x / (1 + x)) ** (1 / GAMMA);
+const fromShare = (share: number) => ((t) => t / (1 - t))((share / WHITE) ** GAMMA);
+const GAMMA = 2.2, WHITE = 1.3;
+
 /** The map that the figures draw and read. */
 export class SmallMap {
-  private constructor(private rgb: Float32Array, private solidAngles: Float64Array, private total: number) {}
+  /** What scales its light to a middle of 1. */
+  private scale: number;
+  /** The luminances of its grays. */
+  readonly bar = h("div");
+
+  private constructor(private rgb: Float32Array, private solidAngles: Float64Array, private total: number) {
+    this.scale = 2 ** Film.fromRgb(COLUMNS, COLUMNS / 2, rgb).exposure();
+    const value = (share: number) => short(Number((fromShare(share) / this.scale).toPrecision(2)));
+    colorBar(this.bar, "Luminance of the map", "linear-gradient(to right, #000, #fff)", [[0, "L = 0"], [0.5, value(0.5)], [1, `${value(1)} or more`]]);
+  }
 
   static async of(stage: Stage): Promise<SmallMap> {
     const rgb = (await stage.app.engines.call("map", COLUMNS)) as Float32Array, rows = COLUMNS / 2;
@@ -73,30 +87,82 @@ export class SmallMap {
 
   /** Draws the map in the background of a figure. */
   paint(context: CanvasRenderingContext2D) {
-    const { rgb } = this, rows = COLUMNS / 2, scale = 2 ** Film.fromRgb(COLUMNS, rows, rgb).exposure();
-    const small = h("canvas", { width: String(COLUMNS), height: String(rows) }), inner = small.getContext("2d")!;
-    const image = inner.createImageData(COLUMNS, rows);
-    for (let i = 0; i < COLUMNS * rows; i++) {
-      for (let c = 0; c < 3; c++) {
-        const x = scale * rgb[3 * i + c];
-        image.data[4 * i + c] = 255 * (x / (1 + x)) ** (1 / 2.2) * 1.3;
-      }
+    context.imageSmoothingEnabled = true;
+    context.drawImage(this.picture(COLUMNS, COLUMNS / 2, (x, y) => [x, y]), 0, 0, WIDTH, HEIGHT);
+  }
+
+  /** A picture of the light at the places of its pixels, clear where there is none. */
+  picture(width: number, height: number, place: (x: number, y: number) => Point | null): HTMLCanvasElement {
+    const { rgb, scale } = this, canvas = h("canvas", { width: String(width), height: String(height) }), context = canvas.getContext("2d")!;
+    const image = context.createImageData(width, height);
+    for (let i = 0; i < width * height; i++) {
+      const at = place((i % width + 0.5) / width, (Math.floor(i / width) + 0.5) / height), texel = at && this.texel(at);
+      if (texel === null) continue;
+      for (let c = 0; c < 3; c++) image.data[4 * i + c] = toByte(scale * rgb[3 * texel + c]);
       image.data[4 * i + 3] = 255;
     }
-    inner.putImageData(image, 0, 0);
-    context.imageSmoothingEnabled = true;
-    context.drawImage(small, 0, 0, WIDTH, HEIGHT);
+    context.putImageData(image, 0, 0);
+    return canvas;
   }
 }
 
+/** The sphere of directions beside the map, as an angular map: straight ahead is in the middle, behind is the rim. */
+export class Ball {
+  readonly element: HTMLElement;
+  private context: CanvasRenderingContext2D;
+  private picture: HTMLCanvasElement | null = null;
+
+  constructor() {
+    const frame: Frame = { left: 0, right: BALL, top: 0, bottom: BALL, xs: [-1, 1], ys: [-1, 1] };
+    const canvas = h("canvas", { width: String(BALL), height: String(BALL), role: "img", "aria-label": "The same light on the sphere of directions, as an angular map", "data-frame": JSON.stringify(frame) });
+    this.context = canvas.getContext("2d")!;
+    this.element = h("figure", {}, canvas, h("figcaption", {}, "the sphere of directions"));
+  }
+
+  /** Draws the light, or only its disc. */
+  paint(map: SmallMap | null) {
+    const { context } = this;
+    context.clearRect(0, 0, BALL, BALL);
+    context.fillStyle = "#000";
+    context.beginPath();
+    context.arc(BALL / 2, BALL / 2, BALL / 2, 0, 2 * Math.PI);
+    context.fill();
+    if (map) context.drawImage((this.picture ??= map.picture(BALL, BALL, (x, y) => fromBall([2 * x - 1, 1 - 2 * y]))), 0, 0);
+  }
+
+  dot(place: Point, radius: number, style: string) {
+    const [x, y] = onBall(place);
+    circle(this.context, BALL * (0.5 + 0.5 * x), BALL * (0.5 - 0.5 * y), radius, style);
+  }
+}
+/** Pixels along an edge of the sphere. */
+const BALL = 320;
+
+/** The place of the map that is at a place of the sphere in [-1, 1]²; null outside. */
+export function fromBall([x, y]: Point): Point | null {
+  const r = Math.hypot(x, y), theta = Math.PI * r, s = r > 0 ? Math.sin(theta) / r : 0;
+  return r < 1 ? placeOf([s * x, s * y, -Math.cos(theta)]) : null;
+}
+
+/** The place on the sphere of a place on the map. */
+export function onBall(place: Point): Point {
+  const [x, y, z] = direction(place), across = Math.hypot(x, y) || 1, r = Math.acos(Math.min(Math.max(-z, -1), 1)) / Math.PI;
+  return [r * x / across, r * y / across];
+}
+
+/** The place of a direction. */
+export const placeOf = ([x, y, z]: Vector): Point => [(Math.atan2(-x, z) / (2 * Math.PI) + 1) % 1, Math.acos(Math.min(Math.max(y, -1), 1)) / Math.PI];
+
 export type Vector = [number, number, number];
-export const direction = ([u, v]: Point): Vector => [Math.sin(Math.PI * v) * Math.cos(2 * Math.PI * u), Math.cos(Math.PI * v), Math.sin(Math.PI * v) * Math.sin(2 * Math.PI * u)];
+export const direction = ([u, v]: Point): Vector => [-Math.sin(Math.PI * v) * Math.sin(2 * Math.PI * u), Math.cos(Math.PI * v), Math.sin(Math.PI * v) * Math.cos(2 * Math.PI * u)];
 export const cosine = (a: Vector, b: Vector) => a.reduce((sum, c, k) => sum + c * b[k], 0);
 
-/** A dot with a dark rim. */
-export function dot(context: CanvasRenderingContext2D, [u, v]: Point, radius: number, style: string) {
+/** A dot on the map with a dark rim. */
+export const dot = (context: CanvasRenderingContext2D, [u, v]: Point, radius: number, style: string) => circle(context, WIDTH * u, HEIGHT * v, radius, style);
+
+function circle(context: CanvasRenderingContext2D, x: number, y: number, radius: number, style: string) {
   context.beginPath();
-  context.arc(WIDTH * u, HEIGHT * v, radius, 0, 2 * Math.PI);
+  context.arc(x, y, radius, 0, 2 * Math.PI);
   context.fillStyle = style;
   context.fill();
   context.strokeStyle = "#000";

@@ -82,6 +82,7 @@ export const fourWays = (stage: Stage) => {
     const all = WAYS.map((way) => runsOf(way).slice(0, n)), over = pointed();
     const at = over && 4 * (Math.min(Math.floor(over.y), size - 1) * size + Math.min(Math.floor(over.x), size - 1));
     if (over && at !== null) {
+      stage.mark(...WAYS.flatMap((_, frame) => (frame === over.frame ? [] : [{ ...over, frame }])));
       const [seen, y] = [luminance(all[over.frame].at(-1)!.film.pixels, at), luminance(truth[0].film.pixels, at)];
       stage.read(`Under the pointer, ${WAYS[over.frame].name} has ${short(Number(seen.toPrecision(3)))}, the reference ${short(Number(y.toPrecision(3)))}${border < 1 ? "; right of the border is the reference" : "; drag to uncover the reference"}.`);
     } else stage.read(null);
