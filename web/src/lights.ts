@@ -199,6 +199,7 @@ export class LightsPanel {
     $("rig-shading").hidden = false;
     this.offer(settings);
     document.documentElement.dataset.rig = `${state.method}:${lights}`;
+    document.documentElement.dataset.ready = "true";
   });
 
   /** Shows why there is no rig. */

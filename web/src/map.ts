@@ -145,6 +145,7 @@ export class MapPanel {
     $("map-caption").textContent = `${app.envName}, ${size[0]} × ${size[1]} texels, rotated by ${degrees(state.rotate)}; ${this.sun ? `${state.env === "sky" ? "the sun" : "the brightest compact light"} is outlined` : "no compact light found"}.`;
     this.mark();
     document.documentElement.dataset.map = key;
+    document.documentElement.dataset.ready = "true";
     this.follow();
   }
 

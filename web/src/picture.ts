@@ -103,9 +103,9 @@ export class PicturePanel {
   /** Whether the picture waits for a panel that shows it. */
   private postponed = false;
 
-  /** Renders the picture. The lecture's figures do not share the computer with a picture that nobody sees. */
+  /** Renders the picture. Other panels do not share the computer with a picture that nobody sees. */
   private render(atOnce: boolean) {
-    this.postponed = this.app.embeds || this.app.state.panel === "lecture";
+    this.postponed = this.app.embeds || !["picture", "xray"].includes(this.app.state.panel);
     if (!this.postponed) void this.restart(atOnce);
   }
 

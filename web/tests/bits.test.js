@@ -6,7 +6,7 @@ import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { close, drop, launch, open, pixelsOf, program, rendered, renderedAnew, slide } from "./page.js";
+import { bytesOf, close, drop, launch, open as openPage, pixelsOf, program, rendered, renderedAnew, slide } from "./page.js";
 import { requireTheSame } from "./same.js";
 
 // One for each kind of strategy, and for what differs most within a kind.
@@ -14,6 +14,9 @@ const STRATEGIES = [
   "brdf:2", "environment:2", "mis:2:1", "mis:1:1:heuristic=balance:no-compensation", "product:8", "product:3", "rejection:8",
   "rejection:rays=2:tries=16", "sir:2/32", "sir:2", "sir:2/16:from=brdf:resampling=multinomial", "median-cut:16", "variance-minimization:16",
 ];
+
+/** Opens the page; the error of a picture is not tested here. */
+const open = (hash, options) => openPage(hash, { refers: false, ...options });
 
 before(launch);
 after(close);
@@ -117,13 +120,13 @@ for (const query of ["", "?2d"]) {
       for (const exposure of [-5, -1, 2, 7]) {
         await slide(page, "#exposure", exposure);
         const seen = await pixelsOf(page, "film");
-        const expected = await page.evaluate(async () => {
+        const expected = await bytesOf(page, async () => {
           const bytes = await window.domelight.picture.file("png");
           const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
           const canvas = Object.assign(document.createElement("canvas"), { width: bitmap.width, height: bitmap.height });
           const context = canvas.getContext("2d", { willReadFrequently: true });
           context.drawImage(bitmap, 0, 0);
-          return [...context.getImageData(0, 0, canvas.width, canvas.height).data].filter((_, i) => i % 4 < 3);
+          return context.getImageData(0, 0, canvas.width, canvas.height).data.filter((_, i) => i % 4 < 3);
         });
         assert.equal(seen.length, expected.length);
         const most = seen.reduce((most, byte, i) => Math.max(most, Math.abs(byte - expected[i])), 0);

@@ -32,11 +32,29 @@ export const close = () => browser?.close();
 /** How much slower the page's main thread is made, to test what happens on a slow machine. */
 const throttling = Number(process.env.THROTTLE ?? 1);
 
+/** Never makes a reference for the picture's error, which would take time from what is tested. */
+const WITHOUT_REFERENCE = `Object.defineProperty(window, "domelight", { configurable: true, set(value) {
+  value.app.reference = () => new Promise(() => {});
+  Object.defineProperty(window, "domelight", { value });
+} });`;
+
+/** Bytes as text: an array of numbers takes seconds on its way out of the browser. */
+const BASE64 = `window.base64 = (bytes) => {
+  let text = "";
+  for (let i = 0; i < bytes.length; i += 0x8000) text += String.fromCharCode(...bytes.subarray(i, i + 0x8000));
+  return btoa(text);
+};`;
+
+/** The bytes that a function of the page finds. */
+export const bytesOf = async (page, find, argument) => Buffer.from(await page.evaluate(`(${find})(${JSON.stringify(argument)}).then(window.base64)`), "base64");
+
 /** Opens the page, from its file or from an address; whatever goes wrong there, or reaches for another place, fails the test. */
-export async function open(hash = SMALL, { query = "", at = `${address}${query}#${hash}`, script, ready = "html[data-ready]", ...options } = {}) {
+export async function open(hash = SMALL, { query = "", at = `${address}${query}#${hash}`, script, ready = "html[data-ready]", refers = true, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, acceptDownloads: true, ...options });
   const page = await context.newPage();
+  await page.addInitScript(BASE64);
   if (script) await page.addInitScript(script);
+  if (!refers) await page.addInitScript(WITHOUT_REFERENCE);
   if (throttling > 1) await (await context.newCDPSession(page)).send("Emulation.setCPUThrottlingRate", { rate: throttling });
   page.setDefaultTimeout(60_000);
   const complaints = [];
@@ -83,7 +101,7 @@ const ofCanvas = (page, id, of) => page.evaluate(async ([id, of]) => {
   const { data } = context.getImageData(0, 0, copy.width, copy.height);
   switch (of) {
     case "hash": return data.reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 2166136261);
-    case "pixels": return [...data].filter((_, i) => i % 4 < 3);
+    case "pixels": return window.base64(data.filter((_, i) => i % 4 < 3));
     case "mean": return data.reduce((sum, byte) => sum + byte, 0) / data.length;
     default: throw new Error(`nothing is known of ${of}`);
   }
@@ -93,7 +111,7 @@ const ofCanvas = (page, id, of) => page.evaluate(async ([id, of]) => {
 export const canvasHash = (page, id) => ofCanvas(page, id, "hash");
 
 /** R, G and B of a canvas's pixels, row by row. */
-export const pixelsOf = (page, id) => ofCanvas(page, id, "pixels");
+export const pixelsOf = async (page, id) => Buffer.from(await ofCanvas(page, id, "pixels"), "base64");
 
 /** The mean of a canvas's bytes. */
 export const brightness = (page, id) => ofCanvas(page, id, "mean");

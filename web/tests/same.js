@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
-import { program } from "./page.js";
+import { bytesOf, program } from "./page.js";
 
 /** What the program makes of the command that the page shows: the files of the two kinds. */
 function fromProgram(command, folder) {
@@ -51,7 +51,7 @@ export async function requireTheSame(page, folder) {
   const command = await page.textContent("#command");
   const expected = fromProgram(command, folder);
   for (const kind of ["exr", "png"]) {
-    const bytes = Buffer.from(await page.evaluate(async (kind) => [...await window.domelight.picture.file(kind)], kind));
+    const bytes = await bytesOf(page, (kind) => window.domelight.picture.file(kind), kind);
     if (kind === "exr") assert.deepEqual(withoutJob(bytes), withoutJob(expected.exr), `the attributes differ: ${command}`);
     const contents = (file) => (kind === "exr" ? chunks(file) : file);
     assert.ok(contents(expected[kind]).equals(contents(bytes)), `the ${kind} files differ: ${command}`);
