@@ -26,7 +26,8 @@ const parts = {
   SOURCE: attribute(process.env.SOURCE ?? ""),
   VERSION: /^version = "(.*)"/m.exec(text("../Cargo.toml"))[1],
 };
-const page = text("src/index.html").replace(/@(STYLE|MAIN|WORKER|ENGINE|BASE|SOURCE|VERSION)@/g, (_, name) => parts[name]);
+// Indentation says nothing.
+const page = text("src/index.html").replace(/\n +/g, "\n").replace(/@(STYLE|MAIN|WORKER|ENGINE|BASE|SOURCE|VERSION)@/g, (_, name) => parts[name]);
 mkdirSync(new URL("dist", import.meta.url), { recursive: true });
 writeFileSync(new URL("dist/domelight.html", import.meta.url), page);
 const kilobytes = (n) => `${Math.round(n / 1000)} kB`;

@@ -52,12 +52,15 @@ export function placeOf(event: PointerEvent, picture: HTMLElement): [number, num
 /** Reads a picture with a mark by keys: arrows move the mark from where it is shown, in small steps with Shift. */
 export function readByKeys(picture: HTMLElement, label: string, point: (place: [number, number]) => void) {
   for (const [name, value] of Object.entries({ tabindex: "0", role: "application", "aria-label": label, "aria-describedby": "keys-of-pictures" })) picture.setAttribute(name, value);
+  // The mark follows later, but keys may be fast.
+  let at: [number, number] | null = null;
+  for (const kind of ["focus", "pointermove"]) picture.addEventListener(kind, () => { at = null; });
   picture.addEventListener("keydown", (event) => {
     if (!isArrow(event.key) || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
-    const { hidden, style } = picture.querySelector<HTMLElement>(".mark")!, [u, v] = hidden ? [0.5, 0.5] : [parseFloat(style.left) / 100, parseFloat(style.top) / 100];
+    const { hidden, style } = picture.querySelector<HTMLElement>(".mark")!, [u, v] = at ?? (hidden ? [0.5, 0.5] : [parseFloat(style.left) / 100, parseFloat(style.top) / 100]);
     const [x, y] = moved([u, 1 - v], event), most = 0.999999;
-    point([Math.min(x, most), Math.min(1 - y, most)]);
+    point((at = [Math.min(x, most), Math.min(1 - y, most)]));
   });
 }
 

@@ -82,7 +82,7 @@ export const STEPS: Step[] = [
   {
     title: "Ward’s anisotropic Gaussian",
     text: [
-      "Ward models a rough surface by a Gaussian of the half vector’s slope. Proportionality is enough: constants cancel when the cumulative distribution is normalized. With one width α, the azimuth is uniform and the polar angle is the arc tangent of α √(−ln u).",
+      "Ward models a rough surface by a Gaussian of the half vector’s slope. Proportionality is enough: constants cancel when the cumulative distribution is normalized. Per solid angle, the density is the Gaussian divided by π αx αy cos³ θh. With one width α, the azimuth is uniform and the polar angle is the arc tangent of α √(−ln u).",
       "Brushed metal has elongated highlights: one width along the brush and another across it. The azimuth is then sampled first, scaled by the ratio of the widths; the polar angle follows from the width at that azimuth. The arc tangent has values between −90° and 90° only, so the azimuth must be put into the quadrant of 2π u: without that, half of the lobe would never be sampled.",
     ],
     formulas: [
@@ -173,12 +173,12 @@ export const STEPS: Step[] = [
     title: "Rejection",
     text: [
       "The product cannot be inverted, but it can be sampled in two steps: draw samples from one factor, then adjust them until they follow the product. Two methods do that, rejection and resampling. To reject, sample that factor, and accept the direction with a probability proportional to the other factor; a bound on the ratio keeps the probability at most one.",
-      "Accepted directions follow the product exactly. The price is the number of tries, which grows with the looseness of the envelope and differs between pixels: the time of a picture cannot be known before.",
+      "Accepted directions follow the product exactly. The price is the number of tries, which grows with the looseness of the envelope and differs between pixels: the time of a picture cannot be known before. Tries that end with the N-th accepted direction count (N − 1)/(T − 1) of T tries as accepted: N/T would be biased.",
     ],
     formulas: [row(i("P"), par(i("keep")), eq, frac(ofKind("product", i("p"), par(wi)), ofKind("light", i("c"), o("·"), sub(i("q"), i("L")), par(wi))), eq, frac(row(fr, cos(i("i")), int(i("Ω")), Li, d, wi), row(i("c"), o("·"), Lns)), o("≤"), n(1)), row(i("E"), par(i("tries")), eq, i("c"))],
     question: "How do the accepted samples change when the bound is twice too high, and when it is too low?",
     answer: "Twice too high: the same distribution, half as many samples. Too low: the target is cut off where it exceeds the envelope, here beside the peak, where the lobe is strongest relative to the light; the result is biased.",
-    sources: ["von Neumann, Various Techniques Used in Connection with Random Digits, 1951.", BURKE],
+    sources: ["von Neumann, Various Techniques Used in Connection with Random Digits, 1951.", "Haldane, On a Method of Estimating Frequencies, Biometrika 1945.", BURKE],
   },
   {
     title: "Resampling",
@@ -238,7 +238,7 @@ export const STEPS: Step[] = [
     text: [
       "The goal is not equal energy but a small error. The error of a light at a centroid grows with the variance of its region’s light around it. The rule of 2009 measures distances on the map and cuts where the larger of the two variances is smallest; the regions stay rectangles.",
       "Here distances are measured on the sphere, and a cut minimizes the sum of the two variances. Finally, regions that belong together are joined, and each light moves to the centroid of what is nearest to it, until nothing moves; this bends the borders.",
-      "Then a small sun or lamp stays in one region, and the lights go where the energy is spread out: to the rest of the map.",
+      "Then a small sun or lamp stays in one region, and the lights go where the energy is spread out: to the rest of the map. The figure shows the regions of both rules from near, and pictures under the lights of all three methods.",
     ],
     formulas: [row(i("2009:"), space, `<munder>${row(i("min"))}${i("cut")}</munder>`, of, i("max"), of, par(i("v"), par(sub(i("R"), n(1))), o(","), i("v"), par(sub(i("R"), n(2))))), row(i("here:"), space, `<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
     algorithm: [

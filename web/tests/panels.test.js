@@ -12,6 +12,8 @@ const LECTURE = "size=32&spp=4&rows=64&scene=sphere&panel=lecture";
 /** Opens the page; only tests of the error need a reference. */
 const open = (hash, options) => openPage(hash, { refers: false, ...options });
 const REFERS = { refers: true };
+/** A picture of what is not matte. */
+const GLOSSY = SMALL.replace("sphere", "statue");
 
 before(launch);
 after(close);
@@ -245,7 +247,7 @@ test("the map turns, shows the sun, and what a pixel samples", async () => {
 });
 
 test("samples and layers are drawn in every layout of the map", async () => {
-  const { page, done } = await open(`${SMALL}&panel=map&pixel=[27,27]&strategy=mis:1:1`, { reducedMotion: "reduce" });
+  const { page, done } = await open(`${GLOSSY}&panel=map&pixel=[27,27]&strategy=mis:1:1`, { reducedMotion: "reduce" });
   const layers = await page.$$eval("#layer option", (all) => all.map((option) => option.value));
   assert.ok(["product", "sir", "rejection", "own", "target"].every((layer) => layers.includes(layer)));
   for (const mapping of await page.$$eval("#mapping option", (all) => all.map((option) => option.value))) {
@@ -481,7 +483,7 @@ test("where there are no lights, the panel says why and offers nothing", async (
 });
 
 test("a direction under the pointer is read, and marked alike on the map and the hemispheres", async () => {
-  const { page, done } = await open(`${SMALL}&pixel=[27,27]&panel=map&strategy=mis:1:1&layer=environment`, { reducedMotion: "reduce" });
+  const { page, done } = await open(`${GLOSSY}&pixel=[27,27]&panel=map&strategy=mis:1:1&layer=environment`, { reducedMotion: "reduce" });
   await page.waitForSelector("html[data-samples]");
   const over = async (selector, u, v) => {
     const box = await page.locator(selector).first().boundingBox();
@@ -904,15 +906,15 @@ test("color bars say the luminances of maps and hemispheres", async () => {
     const of = (share) => ((t) => t / (1 - t))((share / 1.3) ** 2.2);
     assert.ok(Math.abs(of(byte / 255) / of(1) / (light / white) - 1) < 0.08, `the byte ${byte} is ${light}, and white is ${white}`);
   }
-  await page.evaluate((hash) => { location.hash = hash; }, `${SMALL}&scene=sphere&pixel=[27,27]&panel=xray&strategy=mis:1:1`);
+  await page.evaluate((hash) => { location.hash = hash; }, `${SMALL}&pixel=[27,27]&panel=xray&strategy=mis:1:1`);
   await page.waitForFunction(() => document.querySelectorAll("#hemispheres .colorbar").length === 4);
   const labels = await page.$$eval("#hemispheres .colorbar", (all) => all.map((bar) => bar.getAttribute("aria-label")));
   assert.match(labels[0], /^Luminance of light L: [\d.]+, [\d.]+, [\d.]+$/);
   assert.match(labels[2], /^visibility V: 0, 1$/);
   // Keys move the mark over all of them, and the map.
   await page.focus("#hemispheres .marked");
-  await page.keyboard.press("ArrowRight");
-  await page.waitForFunction(() => /^In this direction, L = /.test(document.getElementById("xray-readout").textContent) && document.querySelector("#hemispheres .mark").style.left === "52%");
+  for (let k = 0; k < 4; k++) await page.keyboard.press("ArrowRight");
+  await page.waitForFunction(() => /^In this direction, L = /.test(document.getElementById("xray-readout").textContent) && document.querySelector("#hemispheres .mark").style.left === "58%");
   await page.focus("#xray-map .marked");
   const read = await text(page, "#xray-readout");
   for (let k = 0; k < 8; k++) await page.keyboard.press("ArrowUp");
@@ -975,6 +977,34 @@ test("step 15 divides the map by the rule of 2009, too", async () => {
   const stated = /shading error is ([\d.]+)\s% matte .* with median cut, ([\d.]+)\s%/.exec(await text(page, "#figure .result"));
   errors.forEach((error, i) => assert.ok(Math.abs(Number(stated[i + 1]) / (100 * error) - 1) < 0.01, `${stated[i + 1]} % for ${error}`));
   assert.match(await text(page, "#figure .spheres"), /the rule of 2009: error/);
+  await done();
+});
+
+test("step 15 shows the brightest light from near, where median cut has most of its lights", async () => {
+  const { page, done } = await open(`${LECTURE}&step=15&figure=6;detail`);
+  await drawn(page, 1);
+  assert.equal(await page.locator("#figure .quartet canvas").count(), 3);
+  const counts = /has (\d+) by median cut, (\d+) by the rule of 2009, (\d+) by variance minimization/.exec(await text(page, "#figure .result")).slice(1).map(Number);
+  assert.ok(counts[0] > counts[1] && counts[1] > 0 && counts[2] > 0, `${counts}`);
+  await page.locator("#figure [data-frame]").nth(1).hover();
+  await page.waitForFunction(() => /^Under the pointer, L = .* per steradian\.$/.test(document.querySelector("#figure .readout").textContent));
+  assert.equal(await page.locator("#figure .overlay .mark").count(), 2);
+  await done();
+});
+
+test("step 3 loses half of the lobe without quadrants", async () => {
+  const { page, done } = await open(`${LECTURE}&step=3`);
+  await drawn(page, 1);
+  const ahead = async () => Number(/([\d.]+)\s% of their half vectors/.exec(await text(page, "#figure .result"))[1]);
+  assert.ok(Math.abs(await ahead() - 50) < 4, `${await ahead()} %`);
+  await page.selectOption("#figure select", "arctan");
+  await page.waitForFunction(() => /100\s% of their half vectors/.test(document.querySelector("#figure .result").textContent));
+  // The density of half vectors integrates to one over their hemisphere: at θh = 0 it is 1 / (π αx αy).
+  await page.locator("#figure [data-frame]").nth(1).focus();
+  for (let k = 0; k < 25; k++) await page.keyboard.press("ArrowLeft");
+  await settled(page);
+  const peak = Number(/p\(ωh\) = ([\d.]+) along x/.exec(await text(page, "#figure .readout"))[1]);
+  assert.ok(Math.abs(peak * Math.PI * 0.3 * 0.08 - 1) < 0.01, `${peak}`);
   await done();
 });
 
@@ -1285,7 +1315,7 @@ test("the command, the link and both pictures are taken away", async () => {
   await page.click("#copy-link");
   await page.waitForFunction(() => document.getElementById("status").textContent === "Link copied");
   const [plain, developed, link] = await page.evaluate(() => window.copied);
-  assert.match(plain, /^domelight render statue --env sky --env-rows=64 .*--strategy=brdf:2 --spp=4 --passes=doubling -o domelight\.exr -o domelight\.png$/);
+  assert.match(plain, /^domelight render sphere --env sky --env-rows=64 .*--strategy=brdf:2 --spp=4 --passes=doubling -o domelight\.exr -o domelight\.png$/);
   assert.match(developed, /--exposure=-2 --tone=aces -o/);
   assert.match(link, /^file:.*#.*exposure=-2&curve=aces/);
   for (const [kind, magic] of [["exr", [0x76, 0x2f, 0x31, 0x01]], ["png", [0x89, 0x50, 0x4e, 0x47]]]) {
@@ -1298,7 +1328,7 @@ test("the command, the link and both pictures are taken away", async () => {
 });
 
 test("every material has controls for all that its text says", async () => {
-  const { page, done } = await open(`${SMALL}&scene=sphere&size=24&spp=1&strategy=brdf:1`);
+  const { page, done } = await open(`${SMALL}&size=24&spp=1&strategy=brdf:1`);
   await rendered(page);
   const models = await page.$$eval("#model option", (all) => all.map((option) => option.value).filter(Boolean));
   assert.deepEqual(models, ["diffuse", "phong", "ward", "ggx", "beckmann", "gltf", "mix"]);
@@ -1380,7 +1410,7 @@ test("a visitor without a link is offered the lecture and a model, and reads ver
 });
 
 test("the hash keeps the state", async () => {
-  const { page, done } = await open(`${SMALL}&scene=sphere&env=cathedral&rotate=0&strategy=brdf:2&panel=lights&lights=16&method=median-cut`);
+  const { page, done } = await open(`${SMALL}&env=cathedral&rotate=0&strategy=brdf:2&panel=lights&lights=16&method=median-cut`);
   await page.waitForSelector("html[data-rig='median-cut:16']");
   await show(page, "picture");
   assert.equal(await page.inputValue("#scene"), "sphere");
@@ -1448,7 +1478,7 @@ test("another page shows a step alone", async () => {
 });
 
 test("changes are undone and redone, by buttons and by keys", async () => {
-  const { page, done } = await open(`${SMALL}&scene=sphere`);
+  const { page, done } = await open(`${SMALL}`);
   await rendered(page);
   const [undo, redo] = ["Undo", "Redo"].map((name) => page.locator(`#history button:text-is("${name}")`));
   assert.ok(await undo.isDisabled() && await redo.isDisabled());
@@ -1552,7 +1582,7 @@ test("a figure is drawn once for a link, under its light", async () => {
 });
 
 test("terms are explained under the pointer and at the keyboard's focus", async () => {
-  const { page, done } = await open(`${SMALL}&scene=sphere&strategy=brdf:2`, REFERS);
+  const { page, done } = await open(`${SMALL}&strategy=brdf:2`, REFERS);
   await rendered(page);
   const meaning = page.locator("#meaning");
   await page.waitForFunction(() => /brdf:2/.test(document.querySelector("#picture figcaption .term:last-of-type, #picture figcaption").textContent));
@@ -1649,7 +1679,7 @@ test("zooming ends far outside and close to the scene", async () => {
 });
 
 test("every panel fits 390, 820 and 1440 pixels and has no violations of accessibility, light and dark", async () => {
-  const { page, done } = await open(`${SMALL}&pixel=[27,27]&scene=statue`);
+  const { page, done } = await open(`${SMALL}&pixel=[27,27]`);
   await rendered(page);
   const seen = { map: "[data-map][data-samples]", xray: "[data-xray]", lights: "[data-rig]", lecture: "[data-step]" };
   for (const panel of ["picture", "map", "xray", "lights", "lecture"]) {

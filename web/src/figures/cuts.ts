@@ -6,6 +6,7 @@ import { plot, type Series } from "../plot";
 import type { Mark, Stage } from "../stage";
 import { isBuiltinProbe } from "../state";
 import type { Point } from "./curves";
+import { Detail } from "./detail";
 import { sizeOf } from "./lab";
 import { Pictures } from "./pictures";
 import { Ball, COLUMNS, HEIGHT, SmallMap, WIDTH, canvas, cosine, direction, dot, fromBall, onBall, placeOf } from "./small_map";
@@ -153,7 +154,7 @@ const texelOf = ([x, y]: Point) => Math.min(Math.floor(y * HEIGHT), HEIGHT - 1) 
 export const cuts = (method: Method, other: Method) => (stage: Stage) => {
   const isMinimized = method === "variance-minimization";
   const rounds = stage.player("Lights", 0, 9, 4, (k) => String(2 ** k));
-  const shown = stage.choice("Show", [["map", "regions on the map"], ["lights", "the lights alone"], ...(isBuiltinProbe(stage.app.state.env) ? [["pictures", "pictures under the lights"] as [string, string]] : [])]);
+  const shown = stage.choice("Show", [["map", "regions on the map"], ["lights", "the lights alone"], ...(isMinimized ? [["detail", "the brightest light from near"] as [string, string]] : []), ...(isBuiltinProbe(stage.app.state.env) ? [["pictures", "pictures under the lights"] as [string, string]] : [])]);
   const refined = isMinimized ? stage.choice("Regions", [["refined", "joined and moved"], ["rectangles", "rectangles"], ["2009", "rectangles, by the rule of 2009"]]) : () => "refined";
   /** The method with its rule. */
   const own = (): Method => (refined() === "2009" ? "variance-minimization:2009" : method);
@@ -165,6 +166,7 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
   // Dragging moves the cut, or holds a region, to compare it while the lights play.
   let pictures: Pictures | null = null;
   const pointed = stage.pointer((at) => {
+    if (by() !== "hand" && shown() === "detail") return;
     if (by() !== "hand" && shown() === "pictures") pictures?.drag(at);
     else if (by() === "hand") hand.set(Math.min(Math.max(at.x, 0.05), 0.95));
     else {
@@ -173,11 +175,31 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
     }
   });
   let known: { key: string; rig: Rig; beside: Rig; regions: Uint32Array; films: Film[] } | null = null;
+  const settingsOf = (name: Method, n: number, refine: boolean) => JSON.stringify({ method: name, refine, n, sun: false, lamps: 0 });
+  /** The methods that are compared: what the step explains, and what became of it. */
+  const compared: Method[] = isMinimized ? [other, "variance-minimization:2009", method] : [method];
+  let detail: Detail | null = null, counted = { n: 0, counts: [] as number[] };
+  const drawDetail = async (map: SmallMap, n: number) => {
+    detail ??= new Detail(stage, map);
+    if (counted.n !== n) {
+      const divisions = [];
+      for (const name of compared) {
+        const settings = settingsOf(name, n, name === method);
+        divisions.push({ name: NAMES[name], settings, lights: (JSON.parse(await stage.app.engines.call("lights", settings)) as Rig).lights });
+      }
+      counted = { n, counts: await detail.draw(divisions) };
+    }
+    stage.fill(detail.element);
+    const { counts } = counted, over = pointed();
+    if (over) stage.mark(...compared.map((_, frame) => ({ ...over, frame })).filter(({ frame }) => frame !== over.frame));
+    stage.read(over && `${map.read(detail.place(over))}.`);
+    stage.say(`Of ${n} light${n > 1 ? "s" : ""}, this part of the map has ${compared.map((name, i) => `${counts[i]} by ${NAMES[name]}`).join(", ")}. The light is shown at an eighth, because it is so bright.`);
+  };
   const divide = async (n: number) => {
     const { engines } = stage.app, key = `${n} ${refined()}`;
     if (known?.key === key) return known;
-    const settings = (name: string) => JSON.stringify({ method: name, refine: refined() === "refined", n, sun: false, lamps: 0 });
-    const ask = async (name: string): Promise<[Rig, Film[]]> => {
+    const settings = (name: Method) => settingsOf(name, n, refined() === "refined");
+    const ask = async (name: Method): Promise<[Rig, Film[]]> => {
       const rig = JSON.parse(await engines.call("lights", settings(name))) as Rig;
       const both = isMinimized ? (await engines.call("spheres", settings(name), SPHERE, 0)) as Float32Array : new Float32Array(), size = both.length / 2;
       return [rig, size ? [0, 1].map((k) => Film.fromRgb(SPHERE, SPHERE, both.subarray(k * size, (k + 1) * size))) : []];
@@ -223,10 +245,10 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
     stage.show(hand, isByHand);
     map ??= await SmallMap.of(stage);
     if (isByHand) return drawHand(map);
+    if (shown() === "detail") return drawDetail(map, n);
     if (shown() === "pictures") {
-      // What the step explains, and what became of it.
-      const methods: Method[] = isMinimized ? [other, "variance-minimization:2009", method] : [method], errors = await (pictures ??= underLights(stage, methods)).draw(n, pointed(), () => shown() === "pictures" && n === 2 ** rounds() && by() !== "hand");
-      if (errors) stage.say(`The picture’s relative RMSE with ${n} light${n > 1 ? "s" : ""} is ${errors.map((error, i) => `${percent(error)} by ${NAMES[methods[i]]}`).join(", ")}. Each light casts a hard shadow of its own, so few lights show as steps; at edges, the noise of the camera’s samples counts, too.`);
+      const errors = await (pictures ??= underLights(stage, compared)).draw(n, pointed(), () => shown() === "pictures" && n === 2 ** rounds() && by() !== "hand");
+      if (errors) stage.say(`The picture’s relative RMSE with ${n} light${n > 1 ? "s" : ""} is ${errors.map((error, i) => `${percent(error)} by ${NAMES[compared[i]]}`).join(", ")}. Each light casts a hard shadow of its own, so few lights show as steps; at edges, the noise of the camera’s samples counts, too.`);
       return;
     }
     const { rig, beside, regions, films } = await divide(n), at = pointed(), over = at && placeAt(at, stage.app.state.rotate);

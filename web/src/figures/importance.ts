@@ -64,6 +64,7 @@ export class Importance {
     FUNCTIONS.forEach(({ layer, kind }, i) => this.disc(i, layers, layer, samples[i], color(kind), place));
     this.stage.fill(this.element);
     this.read(layers, place, over);
+    if (over && over.frame < PICTURES.length) this.stage.mark({ ...over, frame: 1 - over.frame });
     const truth = await lab.truth(of), errors: number[] = [];
     for (const [i, { strategy }] of PICTURES.entries()) {
       if (!isStill()) return;

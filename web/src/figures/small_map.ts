@@ -73,6 +73,13 @@ export class SmallMap {
     return this.sum(has) / (this.total || 1);
   }
 
+  /** The place of the brightest texel. */
+  get brightest(): Point {
+    let best = 0;
+    for (let i = 1; i < COLUMNS * COLUMNS / 2; i++) if (this.luminance(i) > this.luminance(best)) best = i;
+    return [(best % COLUMNS + 0.5) / COLUMNS, (Math.floor(best / COLUMNS) + 0.5) / (COLUMNS / 2)];
+  }
+
   /** The texel at a place. */
   texel([u, v]: Point): number {
     const at = (c: number, n: number) => Math.min(Math.floor(c * n), n - 1);
@@ -92,8 +99,8 @@ export class SmallMap {
   }
 
   /** A picture of the light at the places of its pixels, clear where there is none. */
-  picture(width: number, height: number, place: (x: number, y: number) => Point | null): HTMLCanvasElement {
-    const { rgb, scale } = this, canvas = h("canvas", { width: String(width), height: String(height) }), context = canvas.getContext("2d")!;
+  picture(width: number, height: number, place: (x: number, y: number) => Point | null, exposure = 1): HTMLCanvasElement {
+    const { rgb } = this, scale = exposure * this.scale, canvas = h("canvas", { width: String(width), height: String(height) }), context = canvas.getContext("2d")!;
     const image = context.createImageData(width, height);
     for (let i = 0; i < width * height; i++) {
       const at = place((i % width + 0.5) / width, (Math.floor(i / width) + 0.5) / height), texel = at && this.texel(at);
@@ -160,7 +167,7 @@ export const cosine = (a: Vector, b: Vector) => a.reduce((sum, c, k) => sum + c 
 /** A dot on the map with a dark rim. */
 export const dot = (context: CanvasRenderingContext2D, [u, v]: Point, radius: number, style: string) => circle(context, WIDTH * u, HEIGHT * v, radius, style);
 
-function circle(context: CanvasRenderingContext2D, x: number, y: number, radius: number, style: string) {
+export function circle(context: CanvasRenderingContext2D, x: number, y: number, radius: number, style: string) {
   context.beginPath();
   context.arc(x, y, radius, 0, 2 * Math.PI);
   context.fillStyle = style;
