@@ -6,9 +6,12 @@ import { availableParallelism, tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { after, before, test } from "node:test";
 import { OBJ, SCENE, glb, gltf, png } from "./models.js";
-import { SMALL, close, drop, launch, memory, open, rendered, renderedAnew, text } from "./page.js";
+import { close, drop, launch, memory, open, rendered, renderedAnew, text } from "./page.js";
 
 let folder;
+/** A small picture of the scene that a page without a link shows. */
+const SMALL = "size=64&spp=4&rows=64";
+
 before(async () => {
   folder = mkdtempSync(join(tmpdir(), "domelight-web-"));
   await launch();
