@@ -355,25 +355,31 @@ fn a_pixel_outside_is_refused() {
     assert!(text.contains("(1, 0)") && text.contains("1x1"), "{text}");
 }
 
-/// In the room, the window holds a small part of the sphere; the advice is a portal, unless there is one.
+/// In the room, the window holds a small part of the sphere. The advice is a portal, unless there is one or it is found.
 #[test]
 fn a_room_is_told_apart() {
     let environment =
         Environment::new(RgbImage::filled(8, 4, Rgb::WHITE), Orientation::default(), 1.0);
     let environment = environment.unwrap();
-    let settings = RenderSettings { width: 24, height: 24, ..RenderSettings::default() };
-    let enclosure = |scene: BuiltinScene, keep_portals: bool| {
+    let enclosure = |scene: BuiltinScene, keep_portals: bool, find_portals: bool| {
+        let settings =
+            RenderSettings { width: 24, height: 24, find_portals, ..RenderSettings::default() };
         let mut description = scene.description();
         description.portals.retain(|_| keep_portals);
         let scene = Scene::new(description).unwrap();
         let camera = Camera::framing(&scene, 24, 24);
         Inspector::new(&scene, &camera, &environment, &settings, [12, 20]).unwrap().enclosure()
     };
-    let room = enclosure(BuiltinScene::Room, false).unwrap();
+    let room = enclosure(BuiltinScene::Room, false, false).unwrap();
     assert!((0.001..0.1).contains(&room.open), "{room:?}");
     let text = room.to_string();
     assert!(text.contains("of the sphere: name it as a portal"), "{text}");
-    let text = enclosure(BuiltinScene::Room, true).unwrap().to_string();
+    let text = enclosure(BuiltinScene::Room, false, true).unwrap().to_string();
+    assert!(
+        text.ends_with("of the sphere, through a window that product looks through first"),
+        "{text}"
+    );
+    let text = enclosure(BuiltinScene::Room, true, true).unwrap().to_string();
     assert!(text.ends_with("of the sphere"), "{text}");
-    assert_eq!(enclosure(BuiltinScene::Spheres, false), None);
+    assert_eq!(enclosure(BuiltinScene::Spheres, false, true), None);
 }

@@ -42,11 +42,13 @@ const LEAST_FREE: f64 = 0.3;
 /// The least part of the free rays that all portals together explain; else there are none.
 const LEAST_EXPLAINED: f64 = 0.7;
 /// The part of the free rays that may be left unexplained.
-const REST: f64 = 0.02;
+const REST: f64 = 0.05;
 /// The most portals.
 const MOST: usize = 16;
-/// The sizes of patches of a plane and of places, as fractions of the extent of the points.
+/// The sizes of patches in which rays meet, of those by which an opening grows, and of places, as fractions of the extent of
+/// the points. The second are so wide that most patches of a window have several rays.
 const PATCH: f32 = 1.0 / 48.0;
+const WIDE_PATCH: f32 = 1.0 / 24.0;
 const PLACE: f32 = 1.0 / 12.0;
 /// Rays that choose a plane, and normals that choose orientations, at most.
 const CHOOSING: usize = 1000;
@@ -58,8 +60,10 @@ const WALLS: usize = 8;
 const ALIKE: f32 = 0.99;
 /// The least part of the surfaces that block rays that makes an orientation or a wall.
 const LEAST_SHARE: f64 = 0.02;
+/// An opening in a wall is preferred to one beside it that is worth up to 1/WALL times as much.
+const WALL: f64 = 0.5;
 /// The part of the densest patch's rays that its neighbors must have.
-const GROWTH: f64 = 0.12;
+const GROWTH: f64 = 0.05;
 
 /// The portals of a render: those that the scene names, otherwise those that are found if the settings ask for it, in
 /// units of [`Scene::unit`].
@@ -269,8 +273,10 @@ impl<'a> Search<'a> {
         let better = |a: Opening, b: Opening| if worth(&b) > worth(&a) { b } else { a };
         let of_orientation = |orientation: &Orientation| {
             let plane = self.densest(orientation, &choosing)?;
-            let planes = std::iter::once(plane).chain(orientation.near(plane, self.extent));
-            planes.filter_map(|plane| self.opening(plane, beams)).reduce(better)
+            let in_wall = orientation.near(plane, self.extent);
+            let in_wall = in_wall.filter_map(|plane| self.opening(plane, beams)).reduce(better);
+            let free = self.opening(plane, beams)?;
+            Some(in_wall.filter(|wall| worth(wall) >= WALL * worth(&free)).unwrap_or(free))
         };
         let of_each: Vec<_> = self.orientations.par_iter().map(of_orientation).collect();
         of_each.into_iter().flatten().reduce(better)
@@ -343,7 +349,7 @@ impl<'a> Search<'a> {
         let crossings: Vec<Vec2> =
             beams.iter().filter_map(|&i| plane.crossing(&self.beams[i], self.extent)).collect();
         let patch_of = |at: Vec2| {
-            let cell = (at / (PATCH * self.extent)).floor();
+            let cell = (at / (WIDE_PATCH * self.extent)).floor();
             [cell.x as i32, cell.y as i32]
         };
         let mut patches: BTreeMap<[i32; 2], usize> = BTreeMap::new();
@@ -399,7 +405,7 @@ impl Orientation {
     /// The planes of walls near a plane: most windows lie in a wall.
     fn near(&self, plane: Plane, extent: f32) -> impl Iterator<Item = Plane> {
         /// As a fraction of the extent.
-        const NEAR: f32 = 0.06;
+        const NEAR: f32 = 0.12;
         let walls = self.walls.iter().copied();
         let near = walls.filter(move |wall| (wall - plane.offset).abs() < NEAR * extent);
         near.map(move |offset| Plane { offset, ..plane })
@@ -484,15 +490,7 @@ mod tests {
         [with, without].map(|description| Scene::new(description).unwrap())
     }
 
-    /// The corners, in the order of their sums of coordinates in directions without symmetry.
-    fn corners(portal: &Portal) -> [Vec3; 4] {
-        let (corner, [a, b]) = (portal.corner(), portal.edges());
-        let mut all = [corner, corner + a, corner + b, corner + a + b];
-        all.sort_by(|p, q| p.dot(vec3(1.0, 2.3, 5.1)).total_cmp(&q.dot(vec3(1.0, 2.3, 5.1))));
-        all
-    }
-
-    /// A window is found where the scene names it, in any orientation and size, with a margin of a few percent.
+    /// A window is found within its wall, in any orientation and size, with a margin of a few percent.
     #[test]
     fn the_window_of_a_room_is_found() {
         let turned = Mat4::from_axis_angle(vec3(1.0, 2.0, -0.5).normalize(), 0.7);
@@ -500,13 +498,24 @@ mod tests {
             let [with, without] = rooms(&m);
             let [named] = with.portals() else { panic!("one portal") };
             let found = found(&without);
-            assert_eq!(found.len(), 1, "{found:?}");
-            let near = 0.06 * named.edges()[0].length();
-            for (a, b) in corners(named).into_iter().zip(corners(&found[0])) {
-                assert!(a.distance(b) < near, "{a} for {b} at most {near} away");
+            let [portal] = &found[..] else { panic!("{found:?}") };
+            assert!(portal.area() > named.area() && portal.area() < 1.2 * named.area());
+            for corner in corners(portal) {
+                let inside = corner - named.corner();
+                let depth = inside.dot(named.normal()).abs() / named.edges()[0].length();
+                assert!(depth < 0.2, "{depth} of its height off the inner side of the wall");
+                for edge in named.edges() {
+                    let along = inside.dot(edge) / edge.length_squared();
+                    let off = along.abs().min((along - 1.0).abs());
+                    assert!(off < 0.06, "{corner} is {off} of the edge beside a corner");
+                }
             }
-            assert!(found[0].area() > named.area(), "the margin is outside");
         }
+    }
+
+    fn corners(portal: &Portal) -> [Vec3; 4] {
+        let (corner, [a, b]) = (portal.corner(), portal.edges());
+        [corner, corner + a, corner + b, corner + a + b]
     }
 
     #[test]
