@@ -17,7 +17,7 @@ use super::{Catcher, Observer, RenderContext, RenderSettings, Rendering, portals
 use crate::environment::Environment;
 use crate::sampling::Sampler;
 use crate::scene::{Camera, Scene};
-use crate::strategy::{Portal, PrepareError, PreparedStrategy, Strategy, StrategySpec};
+use crate::strategy::{PrepareError, PreparedStrategy, Strategy, StrategySpec};
 
 /// A progressive render.
 ///
@@ -204,11 +204,6 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     /// The settings of the render.
     pub fn settings(&self) -> &RenderSettings {
         &self.context.settings
-    }
-
-    /// Where the strategy looks for light first, in units of [`Scene::unit`]; see [`portals`].
-    pub fn portals(&self) -> &[Portal] {
-        &self.context.portals
     }
 
     /// The division of the picture into tiles.
