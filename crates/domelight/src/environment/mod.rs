@@ -38,8 +38,6 @@ use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
 use crate::simd::{Colors, LANES, LaneMask as _, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
 use crate::{Rgb, RgbImage};
 
-read_by_name!(UpAxis::ALL, UnknownUpAxis, "there is no up axis");
-
 /// A world axis that points up; the top row of a map faces it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "io", derive(serde::Deserialize), serde(rename_all = "lowercase"))]
@@ -100,6 +98,8 @@ impl UpAxis {
         }
     }
 }
+
+read_by_name!(UpAxis::ALL, UnknownUpAxis, "there is no up axis");
 
 /// The orientation of a map in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

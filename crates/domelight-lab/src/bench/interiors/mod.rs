@@ -21,6 +21,12 @@ const SIZE: [usize; 2] = [128, 128];
 const MATERIALS: [&str; 2] = ["diffuse:0.7", "ggx:0.2"];
 /// Camera samples of the measured pictures.
 const SAMPLES: [u32; 2] = [4, 16];
+/// A reference's strategy, and the camera samples of each of its halves.
+const REFERENCE: &str = "product:8";
+const REFERENCE_SAMPLES: u32 = 1024;
+/// The first seed of a reference, which no measured picture has.
+const REFERENCE_SEED: u64 = 1 << 40;
+
 /// What strategies know of the openings of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -52,12 +58,6 @@ impl Portals {
         }
     }
 }
-
-/// A reference's strategy, and the camera samples of each of its halves.
-const REFERENCE: &str = "product:8";
-const REFERENCE_SAMPLES: u32 = 1024;
-/// The first seed of a reference, which no measured picture has.
-const REFERENCE_SEED: u64 = 1 << 40;
 
 /// A scene, a probe, a material and a strategy.
 #[derive(Serialize, Deserialize)]

@@ -34,7 +34,7 @@ const WIDE: f32 = 0.15;
 /// Narrower lobes count as having this roughness.
 const LEAST_WIDTH: f32 = 1e-3;
 
-/// B and s depend on each other; after this many rounds, more change the error by less than a twentieth.
+/// How often s and B are computed in turns (docs/experiments.md).
 const ROUNDS: usize = 4;
 
 /// The factor of the cell that is seen best is at least this.
