@@ -17,6 +17,9 @@ const VIEWS = [
   ["embed", "panel=lecture&step=9", "?embed=step"],
 ];
 
+/** What a panel without a picture shows when it is drawn. */
+const DRAWN = { map: "html[data-map]", lights: "html[data-rig]", lecture: "#figure[data-drawn]:not([data-drawing])" };
+
 const STEPS = Array.from({ length: 18 }, (_, i) => i + 1);
 const wanted = (name) => !only.length || only.some((panel) => name.startsWith(panel));
 
@@ -26,7 +29,8 @@ for (const [name, hash, query] of VIEWS.filter(([name]) => wanted(name))) {
   for (const width of WIDTHS) {
     for (const colorScheme of ["light", "dark"]) {
       const { page, done } = await open(`${STATE}&${hash}`, { query, viewport: { width, height: 900 }, colorScheme, reducedMotion: "reduce" });
-      if (!query) await rendered(page);
+      const [, panel = "picture"] = /panel=(\w+)/.exec(hash) ?? [];
+      await (panel in DRAWN ? page.waitForSelector(DRAWN[panel]) : rendered(page));
       await page.waitForTimeout(1500);
       await page.screenshot({ path: join(folder, `${name}-${width}-${colorScheme}.png`), fullPage: true });
       await done();

@@ -36,7 +36,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let details = vec![
         detail.panel("Part of the map", None)?,
         detail.panel("Median cut, 64", Some(&cut(LIGHTS)?))?,
-        detail.panel("Variance minimization, 64", Some(&poster(LIGHTS)?))?,
+        detail.panel("The poster's rule, 64", Some(&poster(LIGHTS)?))?,
         detail.panel("On the sphere, refined, 64", Some(&refined(LIGHTS)?))?,
     ];
 
