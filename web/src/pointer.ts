@@ -74,7 +74,8 @@ export function moved([u, v]: Share, { key, shiftKey }: { key: string; shiftKey:
 }
 
 /** Calls `act` while the pointer is over, or drags from, a framed picture in `figure`, and with null when it leaves. In a
- *  picture with the focus, arrow keys move a mark instead, and Enter drags to it. */
+ *  picture with the focus, arrow keys move a mark instead. Enter or Space picks up what is at the mark, or drags it there;
+ *  the arrow keys then carry it until either is pressed again, Escape is, or the focus leaves. */
 export function onPointer(figure: HTMLElement, act: (at: Pointed | null) => void) {
   let held: { frame: number; x: number; y: number } | null = null;
   const under = (event: Event) => framedIn(figure).findIndex((picture) => picture.contains(event.target as Node));
@@ -97,18 +98,27 @@ export function onPointer(figure: HTMLElement, act: (at: Pointed | null) => void
   for (const end of ["pointerup", "pointercancel"]) figure.addEventListener(end, () => { held = null; });
   figure.addEventListener("pointerleave", () => { if (!held) act(null); });
 
-  /** The mark of keys in each picture. */
+  /** The mark of keys in each picture, and where keys have picked something up. */
   const marks = new Map<number, Share>();
-  const mark = (frame: number, dragged = false) => {
+  let carried: { x: number; y: number } | null = null;
+  const mark = (frame: number) => {
     const share = marks.get(frame) ?? [0.5, 0.5], at = unitsOf(framedIn(figure)[frame], share);
     marks.set(frame, share);
-    act({ frame, ...at, dragged, from: at, byKeys: true });
+    act({ frame, ...at, dragged: !!carried, from: carried ?? at, byKeys: true });
+  };
+  /** Picks up what is at a picture's mark, or puts down what is carried. */
+  const carry = (frame: number | null) => {
+    carried = frame === null ? null : unitsOf(framedIn(figure)[frame], marks.get(frame) ?? [0.5, 0.5]);
+    figure.toggleAttribute("data-carrying", !!carried);
   };
   figure.addEventListener("focusin", (event) => {
     const frame = under(event);
     if (frame >= 0 && (event.target as Element).matches(":focus-visible")) mark(frame);
   });
-  figure.addEventListener("focusout", () => act(null));
+  figure.addEventListener("focusout", () => {
+    carry(null);
+    act(null);
+  });
   figure.addEventListener("keydown", (event) => {
     const frame = under(event);
     if (frame < 0 || event.ctrlKey || event.altKey || event.metaKey) return;
@@ -116,7 +126,10 @@ export function onPointer(figure: HTMLElement, act: (at: Pointed | null) => void
       marks.set(frame, moved(marks.get(frame) ?? [0.5, 0.5], event));
       mark(frame);
     } else if (event.key === "Enter" || event.key === " ") {
-      mark(frame, true);
+      carry(carried ? null : frame);
+      mark(frame);
+    } else if (event.key === "Escape" && carried) {
+      carry(null);
       mark(frame);
     } else if (event.key === "Escape") act(null);
     else return;

@@ -187,9 +187,10 @@ export class Stage {
     if (children.length !== pictures.length || pictures.some((picture, i) => children[i] !== picture)) this.drawing.replaceChildren(...pictures);
   }
 
-  /** Shows the values under the pointer, if any. */
+  /** Shows the values under the pointer, if any, and says whether keys carry something. */
   read(text: string | null) {
-    this.readout.textContent = text?.replaceAll(" %", "\u00a0%") || "\u00a0";
+    const carried = this.pointed?.byKeys && this.pointed.dragged ? "Picked up. " : "";
+    this.readout.textContent = `${carried}${text?.replaceAll(" %", "\u00a0%") ?? ""}` || "\u00a0";
   }
 
   /** Answers the step's question from what the figure shows. */

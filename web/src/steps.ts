@@ -35,8 +35,8 @@ const sub = (a: string, b: string) => `<msub>${row(a)}${row(b)}</msub>`;
 const sup = (a: string, b: string) => `<msup>${row(a)}${row(b)}</msup>`;
 const both = (a: string, b: string, c: string) => `<msubsup>${row(a)}${row(b)}${row(c)}</msubsup>`;
 const thin = `<mspace width="0.17em"/>`;
-/** Between a function and its argument. */
-const of = `<mo>⁡</mo>${thin}`;
+/** Between a function and its argument, in parentheses or without. */
+const on = `<mo>⁡</mo>`, of = `${on}${thin}`;
 const sum = (a: string, b: string) => `<munderover>${o("∑")}${row(a)}${row(b)}</munderover>`;
 const int = (a: string) => `<msub>${o("∫")}${row(a)}</msub>`;
 /** Parentheses that grow with what they hold. */
@@ -74,7 +74,7 @@ export const STEPS: Step[] = [
       "If the reflectance has a simple shape, directions can be sampled in proportion to it: map two uniform numbers through its inverse cumulative distribution. For a power of the cosine about an axis, the polar angle is the arc cosine of a root.",
       "The diffuse lobe is the power 1 about the normal. Phong’s lobe is the power n about the mirror direction, so directions sampled about the z axis must be rotated to it; directions below the surface count as zero. Gaussian and GGX lobes can be inverted in the same way.",
     ],
-    formulas: [row(i("p"), par(i("θ"), o(","), i("φ")), eq, frac(row(i("n"), o("+"), n(1)), row(n(2), i("π"))), sup(i("cos"), i("n")), of, i("θ")), row(i("θ"), eq, i("arccos"), of, sup(par(n(1), o("−"), sub(i("u"), n(1))), frac(n(1), row(i("n"), o("+"), n(1))))), row(i("φ"), eq, n(2), i("π"), sub(i("u"), n(2)))],
+    formulas: [row(i("p"), par(i("θ"), o(","), i("φ")), eq, frac(row(i("n"), o("+"), n(1)), row(n(2), i("π"))), thin, sup(i("cos"), i("n")), of, i("θ")), row(i("θ"), eq, i("arccos"), of, sup(par(n(1), o("−"), sub(i("u"), n(1))), frac(n(1), row(i("n"), o("+"), n(1))))), row(i("φ"), eq, n(2), i("π"), sub(i("u"), n(2)))],
     question: "Lower the exponent, then raise it. Why does the taller lobe lose fewer samples?",
     answer: "A density integrates to one, so a narrow lobe is tall. It also stays clear of the horizon, below which samples are lost, unless the viewer is at a grazing angle.",
     sources: ["Phong, Illumination for Computer Generated Pictures, CACM 1975.", "Lafortune and Willems, Using the Modified Phong Reflectance Model for Physically Based Rendering, 1994."],
@@ -86,9 +86,9 @@ export const STEPS: Step[] = [
       "Brushed metal has elongated highlights: one width along the brush and another across it. The azimuth is then sampled first, scaled by the ratio of the widths; the polar angle follows from the width at that azimuth. The arc tangent has values between −90° and 90° only, so the azimuth must be put into the quadrant of 2π u: without that, half of the lobe would never be sampled.",
     ],
     formulas: [
-      row(i("p"), par(wh), o("∝"), i("exp"), of, tall(o("−"), frac(row(sup(i("tan"), n(2)), sub(i("θ"), i("h"))), sup(i("α"), n(2))))), row(sub(i("θ"), i("h")), eq, i("arctan"), of, par(i("α"), sqrt(row(o("−"), i("ln"), of, sub(i("u"), n(1)))))), row(sub(i("φ"), i("h")), eq, n(2), i("π"), sub(i("u"), n(2))),
-      row(i("p"), par(wh), o("∝"), i("exp"), of, tall(o("−"), sup(i("tan"), n(2)), sub(i("θ"), i("h")), tall(frac(row(sup(i("cos"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))),
-      row(sub(i("φ"), i("h")), eq, i("arctan"), of, tall(frac(sub(i("α"), i("y")), sub(i("α"), i("x"))), i("tan"), of, par(n(2), i("π"), sub(i("u"), n(2))))), row(sub(i("θ"), i("h")), eq, i("arctan"), of, sqrt(frac(row(o("−"), i("ln"), of, sub(i("u"), n(1))), row(frac(row(sup(i("cos"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))))],
+      row(i("p"), par(wh), o("∝"), i("exp"), on, tall(o("−"), frac(row(sup(i("tan"), n(2)), sub(i("θ"), i("h"))), sup(i("α"), n(2))))), row(sub(i("θ"), i("h")), eq, i("arctan"), on, par(i("α"), sqrt(row(o("−"), i("ln"), of, sub(i("u"), n(1)))))), row(sub(i("φ"), i("h")), eq, n(2), i("π"), sub(i("u"), n(2))),
+      row(i("p"), par(wh), o("∝"), i("exp"), on, tall(o("−"), sup(i("tan"), n(2)), sub(i("θ"), i("h")), tall(frac(row(sup(i("cos"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))),
+      row(sub(i("φ"), i("h")), eq, i("arctan"), on, tall(frac(sub(i("α"), i("y")), sub(i("α"), i("x"))), thin, i("tan"), on, par(n(2), i("π"), sub(i("u"), n(2))))), row(sub(i("θ"), i("h")), eq, i("arctan"), of, sqrt(frac(row(o("−"), i("ln"), of, sub(i("u"), n(1))), row(frac(row(sup(i("cos"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))))],
     question: "Which way does the highlight stretch when α along x grows?",
     answer: "Along x: the half vectors tilt farther that way, and the reflected directions twice as far.",
     sources: ["Ward, Measuring and Modeling Anisotropic Reflection, SIGGRAPH 1992.", "Walter, Notes on the Ward BRDF, Cornell University, 2005."],
@@ -136,7 +136,7 @@ export const STEPS: Step[] = [
       row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(fr, cos(row(i("i"), o(","), i("j"))), Li, at(i("j")), V, at(i("j"))), row(i("q"), at(i("j"))))),
       row(ofKind("light", sub(i("q"), i("L"))), par(wi), eq, frac(row(Li, par(wi)), row(int(i("Ω")), Li, d, wi))),
       row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(row(int(i("Ω")), Li, d, wi), i("N")), sumN, fr, cos(row(i("i"), o(","), i("j"))), V, at(i("j"))),
-      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(sup(tall(int(i("Ω")), Li, d, wi), n(2)), i("N")), thin, i("Var"), of, par(fr, cos(i("i")), V)),
+      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(sup(tall(int(i("Ω")), Li, d, wi), n(2)), i("N")), thin, i("Var"), on, par(fr, cos(i("i")), V)),
     ],
     question: "How many of the samples hit the brightest hundredth of the map?",
     answer: "About the same share as its share of the total light, which the figure states; under a sky with a sun, most samples.",
@@ -163,7 +163,7 @@ export const STEPS: Step[] = [
     formulas: [
       row(ofKind("product", i("p"), par(wi)), eq, frac(row(fr, cos(i("i")), Li), Lns)), row(Lns, eq, int(i("Ω")), fr, cos(i("i")), Li, d, wi),
       row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, overN, sumN, frac(row(canceled(fr, cos(i("i")), Li), V, at(i("j"))), row(canceled(fr, cos(i("i")), Li), o("/"), Lns))), row(ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(Lns, i("N")), sumN, V, at(i("j"))),
-      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), thin, i("Var"), of, par(V)),
+      row(i("Var"), of, ofKind("estimate", sub(i("L"), row(i("r"), o(","), i("N")))), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), thin, i("Var"), on, par(V)),
     ],
     question: "When does the product resemble neither of its factors?",
     answer: "When light and lobe overlap only in their tails. Then both densities waste nearly all samples, and the product has a peak that neither factor has.",
@@ -199,7 +199,7 @@ export const STEPS: Step[] = [
     ],
     formulas: [
       row(i("Var"), of, sub(i("L"), i("SIR")), eq, frac(sup(i("σ"), n(2)), i("M")), o("+"), tall(n(1), o("−"), frac(n(1), i("M"))), frac(row(sub(i("L"), i("r")), par(sub(i("L"), i("ns")), o("−"), sub(i("L"), i("r")))), i("N"))),
-      row(sup(i("σ"), n(2)), eq, i("Var"), of, tall(frac(row(fr, cos(i("i")), Li, V), i("q")))),
+      row(sup(i("σ"), n(2)), eq, i("Var"), on, tall(frac(row(fr, cos(i("i")), Li, V), i("q")))),
     ],
     question: "Which method is best per ray, and which at equal time? Add some diffuse reflectance and compare again.",
     answer: "Per ray, resampling; at equal time, usually multiple importance sampling. Diffuse reflectance hurts reflectance sampling most.",
@@ -240,7 +240,7 @@ export const STEPS: Step[] = [
       "Here distances are measured on the sphere, and a cut minimizes the sum of the two variances. Finally, regions that belong together are joined, and each light moves to the centroid of what is nearest to it, until nothing moves; this bends the borders.",
       "Then a small sun or lamp stays in one region, and the lights go where the energy is spread out: to the rest of the map. The figure shows the regions of both rules from near, and pictures under the lights of all three methods.",
     ],
-    formulas: [row(i("2009:"), space, `<munder>${row(i("min"))}${i("cut")}</munder>`, of, i("max"), of, par(i("v"), par(sub(i("R"), n(1))), o(","), i("v"), par(sub(i("R"), n(2))))), row(i("here:"), space, `<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
+    formulas: [row(i("2009:"), space, `<munder>${row(i("min"))}${i("cut")}</munder>`, of, i("max"), on, par(i("v"), par(sub(i("R"), n(1))), o(","), i("v"), par(sub(i("R"), n(2))))), row(i("here:"), space, `<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
     algorithm: [
       "Put the whole light probe into the list as one region.",
       "Cut each region of the list where the larger of the two parts’ variances is smallest.",

@@ -848,7 +848,7 @@ test("plots and maps of every step are read by keys", async (t) => {
       assert.equal(await page.locator("#figure .overlay .mark").count(), 0);
     }
   });
-  // Enter drags to the mark.
+  // Enter drags to the mark, and the arrow keys then carry what is there until it is put down.
   await showStep(page, 9);
   const center = () => page.evaluate(() => Number(document.querySelector("#figure input").value));
   const before = await center();
@@ -857,6 +857,23 @@ test("plots and maps of every step are read by keys", async (t) => {
   await page.keyboard.press("Enter");
   await settled(page);
   assert.ok(Math.abs(await center() - before + 0.1) < 0.015, `${before} has become ${await center()}`);
+  assert.match(await text(page, "#figure .readout"), /^Picked up\. Direction 0\.40/);
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("Enter");
+  await page.keyboard.press("ArrowRight");
+  await settled(page);
+  assert.ok(Math.abs(await center() - 0.42) < 0.015, `it stays where it was put down, at ${await center()}`);
+  assert.match(await text(page, "#figure .readout"), /^Direction 0\.44/);
+  // So the keys also reach what is dragged from a place of its own: the sun, at 0.35.
+  for (let k = 0; k < 4; k++) await page.keyboard.press("ArrowLeft");
+  await page.keyboard.press("Enter");
+  for (let k = 0; k < 3; k++) await page.keyboard.press("ArrowLeft");
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("ArrowLeft");
+  await settled(page);
+  const sun = await page.$eval('#figure input[data-name="Sun"]', (input) => Number(input.value));
+  assert.ok(Math.abs(sun - 0.3) < 0.015, `the sun is at ${sun}`);
+  assert.ok(Math.abs(await center() - 0.42) < 0.015, "the lobe stays");
   await done();
 });
 

@@ -1,8 +1,8 @@
 //! The map as a table of rows and columns, for figures: the library's own, that the program's figure draws from.
 
-use domelight::environment::{Environment, LatLongGrid};
+use domelight::environment::LatLongGrid;
 use domelight::math::vec2;
-use domelight::sampling::{Dimension, Sampler, SamplerKind, Table2d, TableError};
+use domelight::sampling::{Dimension, Sampler, SamplerKind, Table2d};
 use serde::Serialize;
 
 use crate::error::refused;
@@ -28,22 +28,6 @@ struct SampleReport {
     share_of_brightest: f64,
 }
 
-/// The luminance of each texel times its solid angle, row by row.
-fn weights(environment: &Environment) -> Vec<f64> {
-    let map = environment.map();
-    let row = |y| {
-        let solid_angle = environment.texel_solid_angle(y);
-        map.row(y).iter().map(move |le| f64::from(le.luminance()) * solid_angle)
-    };
-    (0..map.height).flat_map(row).collect()
-}
-
-fn table(width: usize, weights: &[f64]) -> Result<Table2d, TableError> {
-    Table2d::from_rows(width, weights.len() / width, |y, out| {
-        out.copy_from_slice(&weights[y * width..(y + 1) * width]);
-    })
-}
-
 impl Engine {
     /// The probabilities of the rows of the map in `width` columns and half as many rows, and of the columns of one row;
     /// rows count by their solid angle if `weighted`, and all alike otherwise.
@@ -66,7 +50,10 @@ impl Engine {
         let texels = colors.as_chunks::<3>().0.iter().enumerate();
         let of_row = |y| if weighted { grid.solid_angle(y) } else { 1.0 };
         let weights: Vec<f64> = texels.map(|(i, &c)| luminance(c) * of_row(i / width)).collect();
-        let table = table(width, &weights).map_err(refused)?;
+        let table = Table2d::from_rows(width, height, |y, out| {
+            out.copy_from_slice(&weights[y * width..(y + 1) * width]);
+        })
+        .map_err(refused)?;
         Ok(to_json(&RowReport {
             rows: (0..height).map(|y| table.rows().pmf(y)).collect(),
             columns: (0..width).map(|x| table.conditional_pmf(x, row)).collect(),
@@ -78,10 +65,8 @@ impl Engine {
     /// # Errors
     /// If there is no environment or it is black.
     pub fn map_samples(&self, n: usize, seed: u32) -> Result<String, Error> {
-        let environment = self.environment()?;
-        let [width, height] = [environment.map().width, environment.map().height];
-        let mut weights = weights(environment);
-        let table = table(width, &weights).map_err(refused)?;
+        let table = self.environment()?.rows_and_columns().map_err(refused)?;
+        let (width, height) = (table.width(), table.height());
         let sampler = Sampler::new(SamplerKind::Independent, seed.into(), 0);
         let drawn: Vec<_> = (0..n as u32)
             .map(|i| {
@@ -90,21 +75,19 @@ impl Engine {
             })
             .collect();
         // What the least of the brightest hundredth has.
-        let total: f64 = weights.iter().sum();
-        let of_sample = |column, row| weights[row * width + column];
-        let values: Vec<f64> = drawn.iter().map(|s| of_sample(s.column, s.row)).collect();
-        let n_brightest = (weights.len() / 100).max(1);
-        weights.select_nth_unstable_by(n_brightest - 1, |a, b| b.total_cmp(a));
-        let least = weights[n_brightest - 1];
-        let brightest: f64 = weights[..n_brightest].iter().sum();
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let mut shares: Vec<f64> = texels.map(|(x, y)| table.pmf(x, y)).collect();
+        let n_brightest = (shares.len() / 100).max(1);
+        shares.select_nth_unstable_by(n_brightest - 1, |a, b| b.total_cmp(a));
+        let least = shares[n_brightest - 1];
         let place = |column: usize, x: f32, n: usize| (column as f64 + f64::from(x)) / n as f64;
         Ok(to_json(&SampleReport {
             places: drawn
                 .iter()
                 .map(|s| [place(s.column, s.inside.x, width), place(s.row, s.inside.y, height)])
                 .collect(),
-            n_in_brightest: values.iter().filter(|&&value| value >= least).count(),
-            share_of_brightest: brightest / total,
+            n_in_brightest: drawn.iter().filter(|s| s.pmf >= least).count(),
+            share_of_brightest: shares[..n_brightest].iter().sum(),
         }))
     }
 }

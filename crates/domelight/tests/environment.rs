@@ -122,3 +122,19 @@ fn every_sample_estimates_the_power_exactly() {
         }
     }
 }
+
+/// Figures draw from rows and columns what rendering draws from its own table.
+#[test]
+fn rows_and_columns_have_the_density() {
+    for (name, map) in maps() {
+        let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let (width, height) = (env.map().width, env.map().height);
+        let table = env.rows_and_columns().unwrap();
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let center = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+            let expected = f64::from(env.pdf(env.direction(center))) * env.texel_solid_angle(y);
+            let found = table.pmf(x, y);
+            assert!((found - expected).abs() < 1e-6, "{name}: {found} is not {expected}");
+        }
+    }
+}

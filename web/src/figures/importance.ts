@@ -5,8 +5,10 @@ import { color, h, short } from "../dom";
 import { FilmView } from "../film";
 import { pixels, type Pointed } from "../pointer";
 import type { MapPicture } from "../protocol";
-import type { Stage } from "../stage";
+import type { Mark, Stage } from "../stage";
+import type { Point } from "./curves";
 import { Lab, errorOf, sizeOf, sphere, type Rendered } from "./lab";
+import { ofAngular, onAngular, type Vector } from "./small_map";
 
 /** Pixels along an edge of an importance function, and its drawing's. */
 const TEXELS = 96, DISC = 192;
@@ -22,7 +24,22 @@ const FUNCTIONS = [
 /** What renders the pictures with n rays. */
 const PICTURES = [{ name: "the light sampled", strategy: (n: number) => `environment:${n}` }, { name: "the product sampled", strategy: (n: number) => `sir:${n}/${CANDIDATES * n}` }];
 
+/** The direction that is mirrored at a place in [-1, 1]² of the sphere, seen from +z; null outside. */
+function mirroredAt([x, y]: Point): Vector | null {
+  const z = Math.sqrt(1 - x * x - y * y);
+  return z >= 0 ? [2 * z * x, 2 * z * y, 2 * z * z - 1] : null;
+}
+
+/** Where the sphere mirrors a direction: its normal there is the half vector. */
+const mirroring = ([x, y, z]: Vector): Point => [x / Math.sqrt(2 + 2 * z), y / Math.sqrt(2 + 2 * z)];
+
+/** A place in [-1, 1]² in a picture whose rows count from the top, and the reverse. */
+const inPicture = ([x, y]: Point, size: number) => ({ x: size * (1 + x) / 2, y: size * (1 - y) / 2 });
+const ofPicture = ({ x, y }: { x: number; y: number }, size: number): Point => [2 * x / size - 1, 1 - 2 * y / size];
+
 const canvas = (size: number, label: string, units = size) => h("canvas", { width: String(size), height: String(size), role: "img", "aria-label": label, "data-frame": JSON.stringify({ ...pixels(units, units), right: size, bottom: size }) });
+/** Whether a picture of the sphere is pointed at. */
+const isPicture = ({ frame }: Pointed) => frame < PICTURES.length;
 const figure = (...children: HTMLElement[]) => h("figure", {}, ...children);
 
 export class Importance {
@@ -60,11 +77,11 @@ export class Importance {
     if (this.known.pixel !== pixel) this.known = { pixel, layers: await lab.ask(of, "importance", pixel, "angular", 2 * TEXELS) };
     const layers = this.known.layers!, samples: Float32Array[] = [];
     for (const { strategy } of FUNCTIONS) samples.push((await lab.ask(of, "samples", pixel, strategy, "angular", n, 1)) as Float32Array);
-    const place = over && over.frame >= PICTURES.length ? [over.x / TEXELS, over.y / TEXELS] : null;
-    FUNCTIONS.forEach(({ layer, kind }, i) => this.disc(i, layers, layer, samples[i], color(kind), place));
+    FUNCTIONS.forEach(({ layer, kind }, i) => this.disc(i, layers, layer, samples[i], color(kind)));
     this.stage.fill(this.element);
-    this.read(layers, place, over);
-    if (over && over.frame < PICTURES.length) this.stage.mark({ ...over, frame: 1 - over.frame });
+    const wi = over && (isPicture(over) ? mirroredAt(ofPicture(over, size)) : ofAngular(ofPicture(over, TEXELS)));
+    this.read(layers, wi, over);
+    if (over) this.mark(over, wi);
     const truth = await lab.truth(of), errors: number[] = [];
     for (const [i, { strategy }] of PICTURES.entries()) {
       if (!isStill()) return;
@@ -75,6 +92,15 @@ export class Importance {
     }
     const integral = layers.width ? layers.integrals[OF_PRODUCT].toFixed(2) : null;
     this.stage.say(`With ${n} ray${n > 1 ? "s" : ""} for each pixel, the picture’s relative RMSE is ${short(errors[0])} where the light is sampled and ${short(errors[1])} where the product is. ${integral ? `At pixel ${x}, ${y}, ∫ p of the product is ${integral}.` : "The picked pixel shows no surface."} Drag over a picture to pick a pixel.`);
+  }
+
+  /** Marks the direction under the pointer in the other pictures: in the densities, and where the spheres mirror it. */
+  private mark(over: Pointed, wi: Vector | null) {
+    const onSphere = isPicture(over) ? over : wi && inPicture(mirroring(wi), this.size), onDisc = wi && inPicture(onAngular(wi), TEXELS);
+    const marks: Mark[] = [];
+    if (onSphere) PICTURES.forEach((_, frame) => marks.push({ frame, x: onSphere.x, y: onSphere.y }));
+    if (onDisc) FUNCTIONS.forEach((_, k) => marks.push({ frame: PICTURES.length + k, ...onDisc }));
+    this.stage.mark(...marks.filter(({ frame }) => frame !== over.frame));
   }
 
   private picture(i: number, { film }: Rendered) {
@@ -92,7 +118,7 @@ export class Importance {
   }
 
   /** Draws a density and its samples; brighter is larger, full at its 99th percentile, or else a lamp would hide the rest. */
-  private disc(k: number, { width, pixels }: MapPicture, layer: number, samples: Float32Array, style: string, place: number[] | null) {
+  private disc(k: number, { width, pixels }: MapPicture, layer: number, samples: Float32Array, style: string) {
     const context = this.discs[k];
     context.fillStyle = "#000";
     context.fillRect(0, 0, DISC, DISC);
@@ -104,22 +130,22 @@ export class Importance {
     density.forEach((p, i) => image.data.fill(200 * Math.sqrt(Math.min(p / most, 1)), 4 * i, 4 * i + 3).fill(255, 4 * i + 3, 4 * i + 4));
     inner.putImageData(image, 0, 0);
     context.drawImage(small, 0, 0, DISC, DISC);
-    const dot = (u: number, v: number, radius: number, fill: string) => {
+    context.fillStyle = style;
+    context.strokeStyle = "#fff";
+    for (let i = 0; i < samples.length; i += 4) {
       context.beginPath();
-      context.arc(u * DISC, v * DISC, radius, 0, 2 * Math.PI);
-      context.fillStyle = fill;
+      context.arc(samples[i] * DISC, samples[i + 1] * DISC, 2.5, 0, 2 * Math.PI);
       context.fill();
-      context.strokeStyle = "#fff";
       context.stroke();
-    };
-    for (let i = 0; i < samples.length; i += 4) dot(samples[i], samples[i + 1], 2.5, style);
-    if (place) dot(place[0], place[1], 5, "#ffd34d");
+    }
   }
 
-  private read({ width, pixels }: MapPicture, place: number[] | null, over: Pointed | null) {
-    if (place && width) {
-      const i = Math.min(Math.floor(place[1] * width), width - 1) * width + Math.min(Math.floor(place[0] * width), width - 1), of = (layer: number) => short(pixels[layer * width * width + i]);
-      this.stage.read(Math.hypot(place[0] - 0.5, place[1] - 0.5) > 0.5 ? null : `In this direction, L = ${of(LIGHT)}, f · cos θ = ${of(REFLECTANCE)}, V = ${of(VISIBILITY)}; densities: light ${of(OF_LIGHT)}, lobe ${of(OF_LOBE)}, product ${of(OF_PRODUCT)} per steradian.`);
-    } else this.stage.read(over ? `Column ${Math.floor(over.x)}, row ${Math.min(Math.floor(over.y), this.size - 1)}: drag to pick the pixel whose densities are shown.` : null);
+  private read({ width, pixels }: MapPicture, wi: Vector | null, over: Pointed | null) {
+    if (!over || (!wi && !isPicture(over))) return this.stage.read(null);
+    if (isPicture(over)) return this.stage.read(`Column ${Math.floor(over.x)}, row ${Math.min(Math.floor(over.y), this.size - 1)}${wi ? ", which mirrors the marked direction" : ""}: drag to pick the pixel whose densities are shown.`);
+    if (!width) return this.stage.read(null);
+    const { x, y } = inPicture(onAngular(wi!), width), at = (c: number) => Math.min(Math.floor(c), width - 1), i = at(y) * width + at(x);
+    const of = (layer: number) => short(pixels[layer * width * width + i]);
+    this.stage.read(`In this direction, L = ${of(LIGHT)}, f · cos θ = ${of(REFLECTANCE)}, V = ${of(VISIBILITY)}; densities: light ${of(OF_LIGHT)}, lobe ${of(OF_LOBE)}, product ${of(OF_PRODUCT)} per steradian. The sphere mirrors it at the marks.`);
   }
 }

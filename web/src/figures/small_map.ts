@@ -145,17 +145,26 @@ export class Ball {
 /** Pixels along an edge of the sphere. */
 const BALL = 320;
 
-/** The place of the map that is at a place of the sphere in [-1, 1]²; null outside. */
-export function fromBall([x, y]: Point): Point | null {
+/** The direction at a place of an angular map in [-1, 1]²; null outside. */
+export function ofAngular([x, y]: Point): Vector | null {
   const r = Math.hypot(x, y), theta = Math.PI * r, s = r > 0 ? Math.sin(theta) / r : 0;
-  return r < 1 ? placeOf([s * x, s * y, -Math.cos(theta)]) : null;
+  return r < 1 ? [s * x, s * y, -Math.cos(theta)] : null;
+}
+
+/** The place of a direction on an angular map. */
+export function onAngular([x, y, z]: Vector): Point {
+  const across = Math.hypot(x, y) || 1, r = Math.acos(Math.min(Math.max(-z, -1), 1)) / Math.PI;
+  return [r * x / across, r * y / across];
+}
+
+/** The place of the map that is at a place of the sphere in [-1, 1]²; null outside. */
+export function fromBall(place: Point): Point | null {
+  const wi = ofAngular(place);
+  return wi && placeOf(wi);
 }
 
 /** The place on the sphere of a place on the map. */
-export function onBall(place: Point): Point {
-  const [x, y, z] = direction(place), across = Math.hypot(x, y) || 1, r = Math.acos(Math.min(Math.max(-z, -1), 1)) / Math.PI;
-  return [r * x / across, r * y / across];
-}
+export const onBall = (place: Point): Point => onAngular(direction(place));
 
 /** The place of a direction. */
 export const placeOf = ([x, y, z]: Vector): Point => [(Math.atan2(-x, z) / (2 * Math.PI) + 1) % 1, Math.acos(Math.min(Math.max(y, -1), 1)) / Math.PI];

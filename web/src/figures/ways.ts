@@ -6,11 +6,12 @@ import { pixels } from "../pointer";
 import type { Stage } from "../stage";
 import { Lab, errorOf, sizeOf, sphere, type Rendered } from "./lab";
 
-/** The four ways: name, counts, the strategy at these counts, and one with few samples at a time for equal time. */
+/** The four ways at the counts of the lecture, as in the program’s figure: name, counts, the strategy, and one with few samples
+ *  at a time for equal time. */
 const WAYS = [
   { name: "environment", counts: "100", strategy: "environment:100", few: "environment:4" },
   { name: "reflectance", counts: "75", strategy: "brdf:75", few: "brdf:4" },
-  { name: "both", counts: "50 : 38", strategy: "mis:50:38", few: "mis:2:2" },
+  { name: "both", counts: "37 : 37", strategy: "mis:37:37", few: "mis:2:2" },
   { name: "resampling", counts: "15/800", strategy: "sir:15/800", few: "sir:1/53" },
 ];
 /** The engine's time for each way at equal time [ms]. */
@@ -60,7 +61,7 @@ export const fourWays = (stage: Stage) => {
       caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${withError(mean(runs, (run) => run.error))}`, h("br"), `${withError(mean(runs, (run) => run.time / 1000))} s`);
     });
     const rays = WAYS.map(({ name }, i) => `${name} ${short(Number((mean(all[i], (run) => run.rays)[0] / 1000).toPrecision(3)))} thousand`);
-    stage.say(`Errors are mean relative squared errors of the pixels, times the engine’s own: means of ${n === wanted ? n : `${n} of ${wanted}`} repeat${n > 1 ? "s with their standard errors" : ", too few for a standard error"}. Shadow rays: ${rays.join(", ")}.`);
+    stage.say(`Errors are mean relative squared errors of the pixels, and times are the engine’s alone. Both are means of ${n === wanted ? n : `${n} of ${wanted}`} repeat${n > 1 ? "s with their standard errors" : ", too few for a standard error"}. Shadow rays: ${rays.join(", ")}.`);
     stage.answer(`${answerOf(all, timed)} Diffuse reflectance hurts reflectance sampling most, because its rays then go everywhere.`);
   };
   stage.draw(async () => {

@@ -20,14 +20,8 @@ const NUMBERS: usize = 12;
 const COUNTS: [usize; 3] = [64, 256, 1024];
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
-    let environment = &context.environment;
-    let map = environment.map();
-    let table = Table2d::from_rows(map.width, map.height, |row, out| {
-        let solid_angle = environment.texel_solid_angle(row);
-        for (o, le) in out.iter_mut().zip(map.row(row)) {
-            *o = f64::from(le.luminance()) * solid_angle;
-        }
-    })?;
+    let map = context.environment.map();
+    let table = context.environment.rows_and_columns()?;
     let samples = draw(context, &table, COUNTS[2]);
     let brightest = (0..table.height())
         .max_by(|&a, &b| table.rows().pmf(a).total_cmp(&table.rows().pmf(b)))

@@ -1,5 +1,6 @@
-//! `bindgen MODULE FOLDER [--no-names]`: writes `engine.js`, `engine.d.ts` and `engine_bg.wasm`, what the command wasm-bindgen does
-//! for pages, without the web servers and drivers that it is built with. The names of functions are 5 % of a module.
+//! `bindgen MODULE FOLDER [--names]`: writes `engine.js`, `engine.d.ts` and `engine_bg.wasm`, what the command wasm-bindgen does
+//! for pages, without the web servers and drivers that it is built with. The names of functions are 5 % of a module, and only
+//! profiles show them.
 use std::process::ExitCode;
 
 use wasm_bindgen_cli_support::Bindgen;
@@ -7,10 +8,10 @@ use wasm_bindgen_cli_support::Bindgen;
 fn main() -> ExitCode {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();
     let (module, folder, has_names) = match &arguments[..] {
-        [module, folder] => (module, folder, true),
-        [module, folder, option] if option == "--no-names" => (module, folder, false),
+        [module, folder] => (module, folder, false),
+        [module, folder, option] if option == "--names" => (module, folder, true),
         _ => {
-            eprintln!("usage: bindgen MODULE FOLDER [--no-names]");
+            eprintln!("usage: bindgen MODULE FOLDER [--names]");
             return ExitCode::from(2);
         }
     };

@@ -34,7 +34,7 @@ use crate::math::{
     Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, sin_cos_half_turns, vec2,
 };
 use crate::names::read_by_name;
-use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
+use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, Table2d, TableError};
 use crate::simd::{Colors, LANES, LaneMask as _, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
 use crate::{Rgb, RgbImage};
 
@@ -523,6 +523,21 @@ impl Environment {
     /// If there is no such row.
     pub fn texel_solid_angle(&self, row: usize) -> f64 {
         self.grid.texels.solid_angle(row)
+    }
+
+    /// The luminance of each texel times its solid angle, as a table of rows and columns.
+    ///
+    /// Rendering samples a hierarchical table instead, which keeps samples stratified. This one is for figures.
+    ///
+    /// # Errors
+    /// If the map is black.
+    pub fn rows_and_columns(&self) -> Result<Table2d, TableError> {
+        Table2d::from_rows(self.map.width, self.map.height, |y, out| {
+            let solid_angle = self.texel_solid_angle(y);
+            for (weight, le) in out.iter_mut().zip(self.map.row(y)) {
+                *weight = f64::from(le.luminance()) * solid_angle;
+            }
+        })
     }
 
     /// ∫ luminance dω over the sphere.
