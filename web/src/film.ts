@@ -3,9 +3,6 @@
 
 import { CURVES, ERROR_GLSL, GLSL, develop, errorColor, type Curve } from "./tone";
 
-/** What relative errors add to the squared reference, as the program's comparison does. */
-export const REGULARIZER = 0.01;
-
 /** The luminance of the pixel whose numbers begin at `i`. */
 export const luminance = (pixels: Float32Array, i: number) => 0.2126 * pixels[i] + 0.7152 * pixels[i + 1] + 0.0722 * pixels[i + 2];
 

@@ -2,7 +2,7 @@
 
 import type { App } from "./app";
 import type { Host, RenderSettings } from "./engines";
-import { Film, REGULARIZER, luminance } from "./film";
+import { Film, luminance } from "./film";
 import { GroupedMean, Lattice } from "./passes";
 import type { FromWorker } from "./protocol";
 
@@ -138,7 +138,7 @@ export class Reference {
     for (let i = 0; i < values.length; i++) {
       const a = values[i], s = sums[i], d = m * a - s, y = s / m;
       const squared = m * a * a - 2 * a * s + squares[i];
-      mean.add(groups[i], (d * d - squared) / (m * (m - 1)) / (y * y + REGULARIZER));
+      mean.add(groups[i], (d * d - squared) / (m * (m - 1)) / (y * y + 0.01));
     }
     return mean;
   }
@@ -148,7 +148,7 @@ export class Reference {
   private get variance(): number {
     const { renders: m, sums, squares } = this.current!;
     if (this.varianceOf?.of === this.current && this.varianceOf.renders === m) return this.varianceOf.variance;
-    const variance = sums.reduce((sum, s, i) => sum + (squares[i] - s * s / m) / (m - 1) / ((s / m) ** 2 + REGULARIZER), 0) / sums.length;
+    const variance = sums.reduce((sum, s, i) => sum + (squares[i] - s * s / m) / (m - 1) / ((s / m) ** 2 + 0.01), 0) / sums.length;
     this.varianceOf = { renders: m, of: this.current!, variance };
     return variance;
   }

@@ -727,6 +727,23 @@ test("step 9 shows the densities of a picked pixel on the sphere, and pictures t
   const [disc] = await boxes("#figure .discs canvas");
   await page.mouse.move(disc.x + 0.3 * disc.width, disc.y + 0.3 * disc.height);
   await page.waitForFunction(() => /^In this direction, L = [\d.]+, f · cos θ = .*, V = 1; densities: light .* per steradian/.test(document.querySelector("#figure .readout").textContent));
+  await settled(page);
+  // The direction is marked in the other densities, and on the spheres where their normal is half-way between it and the camera.
+  const marks = () => page.$$eval("#figure .overlay .mark", (all) => all.map((mark) => { const { left, top, width, height } = mark.getBoundingClientRect(); return [left + width / 2, top + height / 2]; }));
+  const found = await marks(), discs = await boxes("#figure .discs canvas");
+  assert.equal(found.length, 4);
+  const near = ([x, y], box, u, v) => assert.ok(Math.hypot(x - box.x - u * box.width, y - box.y - v * box.height) < 2, `a mark at ${(x - box.x) / box.width}, ${(y - box.y) / box.height}, not ${u}, ${v}`);
+  // At 0.3, 0.3 of an angular map: 0.4 √2 π from −z, up to the left.
+  const angle = 0.4 * Math.SQRT2 * Math.PI, side = Math.sin(angle) * Math.SQRT1_2, scale = Math.sqrt(2 - 2 * Math.cos(angle));
+  const onSphere = [0.5 - 0.5 * side / scale, 0.5 - 0.5 * side / scale], [shown] = await boxes("#figure .pictures .marked");
+  near(found[0], shown, ...onSphere);
+  near(found[2], discs[1], 0.3, 0.3);
+  await page.mouse.move(...found[0]);
+  await settled(page);
+  assert.match(await text(page, "#figure .readout"), /mirrors the marked direction/);
+  const back = await marks();
+  assert.equal(back.length, 4);
+  near(back[1], discs[0], 0.3, 0.3);
   await done();
 });
 

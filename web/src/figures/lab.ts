@@ -3,7 +3,7 @@
 import { whileBusy } from "../busy";
 import type { App } from "../app";
 import type { Host } from "../engines";
-import { Film, REGULARIZER, luminance } from "../film";
+import { Film, luminance } from "../film";
 import type { Arguments, Call, Result } from "../protocol";
 
 /** The most pixels along an edge of a figure's picture, which is no larger than that of the Picture panel. */
@@ -39,12 +39,14 @@ export interface Rendered {
   time: number;
 }
 
-/** The mean relative squared error of a picture against two independent references, without their variance. */
+/** The mean relative squared error of a picture against two independent references, without their variance; pixels below a
+ *  tenth of the mean count as if they had that, because a dim room's errors would vanish beside the program's 0.01. */
 export function errorOf({ film }: Rendered, [a, b]: Rendered[]): number {
-  let sum = 0;
+  let sum = 0, mean = 0;
+  for (let i = 0; i < a.film.pixels.length; i += 4) mean += luminance(a.film.pixels, i) / (a.film.pixels.length / 4);
   for (let i = 0; i < film.pixels.length; i += 4) {
     const [x, y, z] = [film, a.film, b.film].map((of) => luminance(of.pixels, i)), truth = (y + z) / 2;
-    sum += (x - y) * (x - z) / (truth * truth + REGULARIZER);
+    sum += (x - y) * (x - z) / (truth * truth + 0.01 * mean * mean);
   }
   return sum / (film.pixels.length / 4);
 }
