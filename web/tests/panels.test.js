@@ -1320,7 +1320,9 @@ test("all steps are printed, with and without answers", async () => {
       assert.equal(answer, answers);
       assert.match(address, i ? new RegExp(`step=${i + 1}$`) : /panel=lecture/);
     }
-    assert.ok((await page.pdf()).length > 50_000);
+    const pdf = await page.pdf();
+    assert.ok(pdf.length > 50_000);
+    assert.equal(pdf.toString("latin1").match(/\/Type\s*\/Page\b/g).length, 18, "each step has a page");
     await page.evaluate(() => { window.printed = false; dispatchEvent(new Event("afterprint")); });
     assert.equal(await page.locator("#handout article").count(), 0);
   }

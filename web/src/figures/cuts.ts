@@ -300,6 +300,6 @@ function colorOf(irradiance: number[]): string {
 /** Which method has the smaller shading error, as the figure shows it. */
 function answerOf(n: number, minimized: Rig, cut: Rig, map: string, minimizing: string): string {
   const compare = (name: string, a: number, b: number) =>
-    a === b ? `${name}, both are alike` : `${name}, ${a < b ? minimizing : "median cut"} has ${short(Number((Math.max(a, b) / Math.max(Math.min(a, b), 1e-9)).toPrecision(2)))} times less`;
+    a === b ? `${name}, both are alike` : `${name}, ${a < b ? minimizing : "median cut"} has ${short(Number((Math.max(a, b) / Math.max(Math.min(a, b), 1e-9)).toPrecision(2)))} times less error`;
   return `With ${n} light${n > 1 ? "s" : ""} of ${map}: ${compare("matte", minimized.diffuse, cut.diffuse)}; ${compare("glossy", minimized.glossy, cut.glossy)}. On a map without small bright lights the difference is smaller.`;
 }
