@@ -1,13 +1,13 @@
-// Runs a snippet in headless Chromium: node browser.mjs wgsl|glsl COLUMNS FOLDER reads u.bin and tables.bin, a texture of so many
-// columns, and writes samples.bin: direction, density, radiance, and the density of a look-up in that direction.
+// Runs a snippet in headless Chromium: node browser.mjs wgsl|glsl FOLDER reads u.bin and each NAME.tables, the columns of a
+// texture and its numbers, and writes NAME.samples: direction, density, radiance, and the density of a look-up in that direction.
 
-import { readFile, writeFile } from "node:fs/promises";
+import { readFile, readdir, writeFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { join } from "node:path";
 
 const { chromium } = createRequire(new URL("../interop/package.json", import.meta.url))("playwright-core");
-const [language, columns, folder] = process.argv.slice(2);
-const read = async (name) => (await readFile(join(folder, name))).toString("base64");
+const [language, folder] = process.argv.slice(2);
+const read = (name) => readFile(join(folder, name));
 
 const browser = await chromium.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
@@ -27,13 +27,14 @@ try {
   // WebGPU is there only for secure origins.
   await page.route("**/*", (route) => route.fulfill({ contentType: "text/html", body: "<title>samples</title>" }));
   await page.goto("https://samples.test/");
-  const samples = await page.evaluate(language === "wgsl" ? wgsl : glsl, {
-    snippet: await readFile(join(folder, "snippet"), "utf8"),
-    tables: await read("tables.bin"),
-    points: await read("u.bin"),
-    columns: Number(columns),
-  });
-  await writeFile(join(folder, "samples.bin"), Buffer.from(samples, "base64"));
+  const snippet = await readFile(join(folder, "snippet"), "utf8");
+  const points = (await read("u.bin")).toString("base64");
+  for (const name of (await readdir(folder)).filter((name) => name.endsWith(".tables"))) {
+    const file = await read(name);
+    const [columns, tables] = [file.readUInt32LE(), file.subarray(4).toString("base64")];
+    const samples = await page.evaluate(language === "wgsl" ? wgsl : glsl, { snippet, tables, points, columns });
+    await writeFile(join(folder, name.replace("tables", "samples")), Buffer.from(samples, "base64"));
+  }
 } finally {
   await browser.close();
 }

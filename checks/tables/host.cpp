@@ -1,10 +1,10 @@
-// Runs a snippet that looks like C as C++. `host FOLDER` reads u.bin and tables.bin and writes samples.bin: direction, density,
-// radiance, and the density of a look-up in that direction.
+// Runs a snippet that looks like C as C++. `host FOLDER` reads u.bin and each NAME.tables, the columns of a texture and its
+// numbers, and writes NAME.samples: direction, density, radiance, and the density of a look-up in that direction.
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <string>
+#include <filesystem>
 #include <vector>
 
 using namespace std;
@@ -35,30 +35,39 @@ template <class T> struct StructuredBuffer {
 
 #include "snippet"
 
-template <class T> static vector<T> read(const string& path) {
+namespace files = std::filesystem;
+
+template <class T> static vector<T> read(const files::path& path, long skip = 0) {
   FILE* file = fopen(path.c_str(), "rb");
   if (!file) { perror(path.c_str()); exit(1); }
-  fseek(file, 0, SEEK_END);
-  vector<T> values(ftell(file) / sizeof(T));
-  rewind(file);
+  vector<T> values((files::file_size(path) - skip) / sizeof(T));
+  fseek(file, skip, SEEK_SET);
   if (fread(values.data(), sizeof(T), values.size(), file) != values.size()) exit(1);
   fclose(file);
   return values;
 }
 
-int main(int, char** arguments) {
-  const string folder = arguments[1];
-  const vector<float4> groups = read<float4>(folder + "/tables.bin");
+static bool draw(const vector<float2>& points, files::path path) {
+  const vector<float4> groups = read<float4>(path, 4);
   const float4* tables = groups.data();
 #if !defined(DOMELIGHT_CUDA) && !defined(DOMELIGHT_METAL)
   domelight_tables.numbers = tables;
 #endif
-  FILE* file = fopen((folder + "/samples.bin").c_str(), "wb");
-  for (const float2 u : read<float2>(folder + "/u.bin")) {
+  FILE* file = fopen(path.replace_extension("samples").c_str(), "wb");
+  if (!file) return false;
+  for (const float2 u : points) {
     const DomelightSample s = domelight_sample(TABLES u);
     const float3 d = s.direction, l = s.radiance;
     const float4 rows[2] = {{d.x, d.y, d.z, s.pdf}, {l.x, l.y, l.z, domelight_pdf(TABLES d)}};
-    if (fwrite(rows, sizeof(rows), 1, file) != 1) return 1;
+    if (fwrite(rows, sizeof(rows), 1, file) != 1) return false;
   }
-  return fclose(file);
+  return fclose(file) == 0;
+}
+
+int main(int, char** arguments) {
+  const files::path folder = arguments[1];
+  const vector<float2> points = read<float2>(folder / "u.bin");
+  for (const auto& entry : files::directory_iterator(folder))
+    if (entry.path().extension() == ".tables" && !draw(points, entry.path())) return 1;
+  return 0;
 }

@@ -27,6 +27,7 @@ mod rig;
 mod rig_export;
 mod scene_bytes;
 mod scene_loaders;
+mod shader_compilers;
 mod shader_tables;
 mod tables;
 mod textures;

@@ -1,14 +1,9 @@
-//! Tables for shaders: their numbers against the environment, and their code as it runs.
+//! Tables for shaders: their numbers against the environment. `checks/tables/check` runs their code.
 
-use domelight::environment::builtin::BuiltinProbe;
-use domelight::environment::{CompensatedTable, Environment, Orientation, UpAxis};
-use domelight::math::{Vec2, Vec3, vec2};
-use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings, TablesError};
+use domelight::environment::{Environment, Orientation, UpAxis};
+use domelight::math::vec2;
+use domelight::rig::tables::{ShaderTables, TableSettings, TablesError};
 use domelight::{Rgb, RgbImage};
-use std::path::{Path, PathBuf};
-use std::process::Command;
-use testkit::quadrature::Adaptive;
-use testkit::{Chi2, Pcg};
 
 /// A sun of one texel over a gradient, with the orientation that most easily goes wrong.
 fn sun(width: usize, height: usize) -> Environment {
@@ -87,6 +82,8 @@ fn what_cannot_be_sampled_is_refused() {
     let white = Environment::constant(Rgb::WHITE).unwrap();
     let settings = TableSettings::default();
     assert_eq!(ShaderTables::new(&black, settings), Err(TablesError::Black));
+    let blinding = Environment::constant(Rgb::splat(3e38)).unwrap();
+    assert_eq!(ShaderTables::new(&blinding, settings), Err(TablesError::TooBright));
     let compensated = TableSettings { compensated: true, ..settings };
     assert_eq!(ShaderTables::new(&white, compensated), Err(TablesError::NothingAboveMean));
     for texels in [0, TableSettings::MOST_TEXELS + 1] {
@@ -107,200 +104,4 @@ fn textures_are_whole_rows_of_the_numbers() {
     let bytes = tables.to_bytes();
     assert_eq!(bytes.len(), 16 * texture.len());
     assert_eq!(bytes[..8], [0, 0, 160, 64, 0, 0, 64, 64]);
-}
-
-/// A sample as a shader drew it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Drawn {
-    direction: Vec3,
-    radiance: Rgb,
-    pdf: f32,
-    /// The density of a look-up in the direction.
-    looked_up: f32,
-}
-
-/// Runs a snippet in a folder of its own.
-struct Shader {
-    language: ShaderLanguage,
-    folder: tempfile::TempDir,
-    /// For languages that are compiled as C++.
-    program: Option<PathBuf>,
-}
-
-impl Shader {
-    fn new(language: ShaderLanguage) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let snippet = match language {
-            // What C++ spells otherwise.
-            ShaderLanguage::Hlsl | ShaderLanguage::Slang => language
-                .snippet()
-                .replace(" : register(t0)", "")
-                .replace("inout float u", "float& u"),
-            ShaderLanguage::Wgsl
-            | ShaderLanguage::Glsl
-            | ShaderLanguage::Cuda
-            | ShaderLanguage::Metal => language.snippet(),
-        };
-        std::fs::write(folder.path().join("snippet"), snippet).unwrap();
-        let is_like_c = !matches!(language, ShaderLanguage::Wgsl | ShaderLanguage::Glsl);
-        let program = is_like_c.then(|| {
-            let program = folder.path().join("shader");
-            let mut compiler = Command::new("c++");
-            compiler.args([
-                "-std=c++17",
-                "-O1",
-                "-ffp-contract=off",
-                "-Wall",
-                "-Wextra",
-                "-Werror",
-            ]);
-            compiler.arg(format!("-DDOMELIGHT_{}", language.name().to_uppercase()));
-            compiler.arg("-I").arg(folder.path()).arg(checks().join("host.cpp"));
-            run(compiler.arg("-o").arg(&program));
-            program
-        });
-        Self { language, folder, program }
-    }
-
-    /// The samples of the points `u`.
-    fn samples(&self, tables: &ShaderTables, u: &[Vec2]) -> Vec<Drawn> {
-        let path = |name: &str| self.folder.path().join(name);
-        std::fs::write(path("tables.bin"), tables.to_bytes()).unwrap();
-        let numbers = u.iter().flat_map(|u| [u.x, u.y]);
-        std::fs::write(path("u.bin"), bytes(numbers)).unwrap();
-        let mut command = match &self.program {
-            Some(program) => Command::new(program),
-            None => Command::new("node"),
-        };
-        if self.program.is_none() {
-            command.arg(checks().join("browser.mjs")).arg(self.language.name());
-            command.arg(tables.texture_width().to_string());
-        }
-        run(command.arg(self.folder.path()));
-        let numbers = std::fs::read(path("samples.bin")).unwrap();
-        let numbers = numbers.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
-        let numbers: Vec<f32> = numbers.collect();
-        assert_eq!(numbers.len(), 8 * u.len());
-        let drawn = |n: &[f32]| Drawn {
-            direction: Vec3::new(n[0], n[1], n[2]),
-            pdf: n[3],
-            radiance: Rgb::new(n[4], n[5], n[6]),
-            looked_up: n[7],
-        };
-        numbers.chunks_exact(8).map(drawn).collect()
-    }
-}
-
-fn bytes(numbers: impl Iterator<Item = f32>) -> Vec<u8> {
-    numbers.flat_map(f32::to_le_bytes).collect()
-}
-
-fn checks() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../checks/tables")
-}
-
-#[track_caller]
-fn run(command: &mut Command) {
-    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
-    assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
-}
-
-/// An environment, its tables, and the density that they claim.
-struct Case {
-    name: &'static str,
-    environment: Environment,
-    compensated: bool,
-}
-
-impl Case {
-    fn all() -> Vec<Self> {
-        let case = |name, environment, compensated| Self { name, environment, compensated };
-        let studio = Environment::from_image(BuiltinProbe::Studio.image(16)).unwrap();
-        let white = Environment::constant(Rgb::WHITE).unwrap();
-        vec![
-            case("a sun, turned, +Z up", sun(16, 8), false),
-            case("a sun, compensated", sun(16, 8), true),
-            case("a studio", studio, false),
-            case("3 x 2 texels", sun(3, 2), false),
-            case("a single texel", white, false),
-            case("7 x 5 texels", sun(7, 5), false),
-        ]
-    }
-
-    fn density(&self) -> impl Fn(Vec3) -> f32 + '_ {
-        let compensated = self.compensated.then(|| CompensatedTable::new(&self.environment));
-        move |wi| match &compensated {
-            Some(table) => table.le_pdf(&self.environment, wi).1,
-            None => self.environment.pdf(wi),
-        }
-    }
-}
-
-/// The test of a case, in all languages.
-fn chi2() -> Chi2 {
-    Chi2 {
-        cells: [41, 83],
-        axis: [0.0, 1.0, 0.0],
-        quadrature: Adaptive { tolerance: 1e-6, min_depth: 2, max_depth: 6 },
-        mass_tolerance: 1e-3,
-        ..Chi2::in_suite_of(3 * Case::all().len())
-    }
-}
-
-/// What a shader draws in each case, of the points that the test draws.
-fn samples(language: ShaderLanguage) -> Vec<Vec<Drawn>> {
-    let mut pcg = Pcg::new(chi2().seed);
-    let point = |_| {
-        let u = pcg.next_2d();
-        pcg.next_f32();
-        u.into()
-    };
-    let u: Vec<Vec2> = (0..chi2().samples).map(point).collect();
-    let shader = Shader::new(language);
-    let draw = |case: &Case| {
-        let settings = TableSettings { compensated: case.compensated, ..TableSettings::default() };
-        shader.samples(&ShaderTables::new(&case.environment, settings).unwrap(), &u)
-    };
-    Case::all().iter().map(draw).collect()
-}
-
-/// What a shader compiler makes of a snippet samples the density that the library states, and states it itself.
-fn check(language: ShaderLanguage) -> Vec<Vec<Drawn>> {
-    let samples = samples(language);
-    for (case, drawn) in Case::all().iter().zip(&samples) {
-        let name = format!("{}, {}", language.name(), case.name);
-        let density = case.density();
-        for drawn in drawn {
-            let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * b;
-            assert!((drawn.direction.length() - 1.0).abs() < 1e-5, "{name}: {drawn:?}");
-            assert!(near(drawn.pdf, density(drawn.direction)), "{name}: {drawn:?}");
-            assert!(near(drawn.looked_up, drawn.pdf), "{name}: {drawn:?}");
-            assert_eq!(drawn.radiance, case.environment.le(drawn.direction), "{name}: {drawn:?}");
-        }
-        let mut next = drawn.iter();
-        let report = chi2().sphere(
-            &name,
-            |_, _| next.next().map(|drawn| drawn.direction.to_array()),
-            |wi| f64::from(density(Vec3::from(wi))),
-        );
-        report.unwrap_or_else(|failure| panic!("{failure}"));
-    }
-    samples
-}
-
-#[test]
-#[ignore = "needs c++"]
-fn shaders_like_c_sample_the_density() {
-    use ShaderLanguage::{Cuda, Hlsl, Metal, Slang};
-    let expected = check(Cuda);
-    for language in [Metal, Hlsl, Slang] {
-        assert!(samples(language) == expected, "{} draws other samples", language.name());
-    }
-}
-
-#[test]
-#[ignore = "needs Node and Chromium"]
-fn shaders_of_the_web_sample_the_density() {
-    check(ShaderLanguage::Wgsl);
-    check(ShaderLanguage::Glsl);
 }
