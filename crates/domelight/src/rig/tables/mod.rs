@@ -71,6 +71,12 @@ pub enum TablesError {
          make tables without compensation"
     )]
     NothingAboveMean,
+    /// Numbers that single precision does not hold.
+    #[error(
+        "the map's light exceeds {:e}, the most that single precision holds: scale it down",
+        f32::MAX
+    )]
+    TooBright,
     /// The averaged map is no environment.
     #[error(transparent)]
     Environment(#[from] EnvironmentError),
@@ -94,7 +100,7 @@ impl ShaderTables {
     /// Makes the tables of an environment, its orientation included.
     ///
     /// # Errors
-    /// If the map is black, if MIS compensation leaves nothing, or if the number of texels is out of range.
+    /// If the map is black or its light overflows, if MIS compensation leaves nothing, or if the number of texels is out of range.
     pub fn new(environment: &Environment, settings: TableSettings) -> Result<Self, TablesError> {
         if settings.texels == 0 || settings.texels > TableSettings::MOST_TEXELS {
             return Err(TablesError::Texels { requested: settings.texels });
@@ -102,11 +108,16 @@ impl ShaderTables {
         let environment = averaged(environment, settings.texels)?;
         let table = environment.table().ok_or(TablesError::Black)?;
         if !settings.compensated {
-            return Ok(Self::of(&environment, table, |le| environment.density(le)));
+            return Self::of(&environment, table, |le| environment.density(le)).finite();
         }
         let compensated = CompensatedTable::new(&environment);
         let table = compensated.table().ok_or(TablesError::NothingAboveMean)?;
-        Ok(Self::of(&environment, table, |le| compensated.density(le)))
+        Self::of(&environment, table, |le| compensated.density(le)).finite()
+    }
+
+    fn finite(self) -> Result<Self, TablesError> {
+        let is_finite = self.groups.iter().flatten().all(|number| number.is_finite());
+        if is_finite { Ok(self) } else { Err(TablesError::TooBright) }
     }
 
     fn of(
