@@ -256,6 +256,10 @@ def check_usd(table, rigs):
     name = f"OpenUSD {usd.VERSION}"
     for rig in rigs.values():
         path = rig.file("usda")
+        errors = usd.errors(path)
+        for error in errors:
+            print(f"{name}: {error}", file=sys.stderr)
+        table.count(name, f"{rig.name}: errors of the schema's validators", len(errors))
         read = usd.lights(path)
         assert set(read) == {light["name"] for light in rig.lights}
         table.count(name, f"{rig.name}: up axis is not the rig's", int(usd.up_axis(path).lower() != rig.up))

@@ -1,7 +1,7 @@
 """OpenUSD reads the stage; the checks are the formulas of UsdLux's own documentation."""
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom, UsdLux
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdValidation
 
 import probe
 
@@ -50,6 +50,13 @@ def dome(path):
 
             return texture, direction
     return None
+
+
+def errors(path):
+    """What the validators of OpenUSD's schemas, geometry and light among them, say of the stage."""
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    found = UsdValidation.ValidationContext(validators).Validate(Usd.Stage.Open(str(path)))
+    return [error.GetErrorAsString() for error in found]
 
 
 def up_axis(path):

@@ -30,6 +30,7 @@ pub(super) fn encode(rig: &RigExport) -> Result<Code<Usd>, ExportError> {
 (
     defaultPrim = "rig"
     doc = {doc}
+    metersPerUnit = 1
     upAxis = "{up}"
 )
 
