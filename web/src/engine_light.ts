@@ -10,6 +10,8 @@ const LANGUAGES: Record<string, string> = { wgsl: "WGSL", glsl: "GLSL", hlsl: "H
 
 interface Targets {
   engines: string[];
+  /** Formats of prefiltered light, and the only engine that reads one. */
+  files: { extension: string; engine: string | null }[];
   languages: { name: string; extension: string }[];
   /** The usual number of texels of tables. */
   texels: number;
@@ -43,8 +45,9 @@ export class EngineLight {
   private async show() {
     if (this.app.state.panel !== "lights") return;
     if (!this.targets) {
-      const { engines, languages, texels } = (this.targets = JSON.parse(await this.app.engines.call("targets")) as Targets);
+      const { engines, files, languages, texels } = (this.targets = JSON.parse(await this.app.engines.call("targets")) as Targets);
       fill($("ibl-engine"), [["", "any: roughness = level / last level"], ...engines.map((name): [string, string] => [name, ENGINES[name] ?? name])], "");
+      fill($("ibl-file"), files.map(({ extension, engine }): [string, string] => [extension, engine ? `.${extension}, for ${ENGINES[engine] ?? engine}` : `.${extension}`]), files[0].extension);
       fill($("tables-language"), languages.map(({ name }): [string, string] => [name, LANGUAGES[name] ?? name]), languages[0].name);
       fill($("tables-texels"), [1 / 32, 1 / 8, 1, 4].map((k): [string, string] => [String(k * texels), count(k * texels)]), String(texels));
     }
@@ -60,18 +63,22 @@ export class EngineLight {
   private offer() {
     if (!this.targets) return;
     $("ibl-most").hidden = chosen("ibl-sun") !== "clamp";
-    this.offerPrefiltered();
+    this.offerPrefiltered(this.targets);
     this.offerTables(this.targets);
   }
 
-  private offerPrefiltered() {
-    const { stem, app: { state } } = this, [engine, size, texels, sun, clamp, container] = ["engine", "size", "texels", "sun", "clamp", "container"].map((name) => chosen(`ibl-${name}`));
-    const settings = JSON.stringify({ engine, size: Number(size), texels, sun, clamp: Number(clamp) });
-    const file = (content: string, suffix: string, meaning: string) =>
-      this.button(`${stem}${suffix}.${container}`, meaning, () => this.prefiltered(settings, content, container));
-    $("ibl-files").replaceChildren(file("radiance", "", "levels of roughness"), file("irradiance", "_irradiance", "diffuse light"), file("brdf", "_brdf", "table of the BRDF"));
-    const command = ["domelight", "ibl", ...lightWords(state), "-o", `${stem}.${container}`, "--irradiance", `${stem}_irradiance.${container}`, "--brdf", `${stem}_brdf.${container}`,
-      ...(engine ? ["--for", engine] : []), "--size", size, ...(sun === "keep" ? [] : ["--sun", sun === "clamp" ? `clamp:${clamp}` : sun]), ...(texels === "rgb9e5" ? [] : ["--texels", texels])];
+  private offerPrefiltered({ files }: Targets) {
+    const { stem, app: { state } } = this, [size, texels, sun, clamp, extension] = ["size", "texels", "sun", "clamp", "file"].map((name) => chosen(`ibl-${name}`));
+    // A file for one engine holds the irradiance, and decides the format of its texels.
+    const only = files.find((file) => file.extension === extension)?.engine, engine = only ?? chosen("ibl-engine");
+    $<HTMLSelectElement>("ibl-engine").disabled = $<HTMLSelectElement>("ibl-texels").disabled = Boolean(only);
+    if (only) $<HTMLSelectElement>("ibl-engine").value = only;
+    const settings = JSON.stringify({ engine, size: Number(size), texels, file: extension, sun, clamp: Number(clamp) });
+    const file = (content: string, suffix: string, meaning: string) => this.button(`${stem}${suffix}.${extension}`, meaning, () => this.prefiltered(settings, content));
+    const others = only ? [] : [file("irradiance", "_irradiance", "diffuse light"), file("brdf", "_brdf", "table of the BRDF")];
+    $("ibl-files").replaceChildren(file("radiance", "", "levels of roughness"), ...others);
+    const command = ["domelight", "ibl", ...lightWords(state), "-o", `${stem}.${extension}`, ...(only ? [] : ["--irradiance", `${stem}_irradiance.${extension}`, "--brdf", `${stem}_brdf.${extension}`]),
+      ...(engine ? ["--for", engine] : []), "--size", size, ...(sun === "keep" ? [] : ["--sun", sun === "clamp" ? `clamp:${clamp}` : sun]), ...(only || texels === "rgb9e5" ? [] : ["--texels", texels])];
     $("ibl-command").replaceChildren(...words(command.map(quoted)));
   }
 
@@ -92,14 +99,14 @@ export class EngineLight {
   }
 
   /** A file of prefiltered light. The engine for references filters it, so that the picture goes on. */
-  private async prefiltered(settings: string, content: string, container: string): Promise<Made> {
+  private async prefiltered(settings: string, content: string): Promise<Made> {
     const host = await this.app.reference(), notes: string[] = [];
     if (content !== "brdf") {
       const { clipped, lost, clamped } = JSON.parse(await host.call("prefilter", settings)) as Prefiltered;
       if (clamped > 0) notes.push(`Clamping takes ${percentage(clamped)} of the light.`);
       if (clipped > 0) notes.push(`${count(clipped)} texels are brighter than the format holds and are clipped: level 0 loses ${percentage(lost)} of its light.`);
     }
-    return { bytes: (await host.call("iblFile", settings, content, container)) as Uint8Array, notes };
+    return { bytes: (await host.call("iblFile", settings, content)) as Uint8Array, notes };
   }
 
   private button(name: string, meaning: string, make: () => Promise<Made>): HTMLButtonElement {

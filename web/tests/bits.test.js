@@ -92,9 +92,13 @@ test("light for engines and shaders has the program's bytes", async () => {
     await page.fill("#ibl-clamp", "20");
     await page.press("#ibl-clamp", "Tab");
     await page.selectOption("#ibl-texels", "half");
-    await page.selectOption("#ibl-container", "dds");
+    await page.selectOption("#ibl-file", "dds");
     assert.match(await page.$eval("#ibl-command", (pre) => pre.textContent), /--for filament --size 64 --sun clamp:20 --texels half$/);
     await compare("#ibl-files button", "#ibl-command");
+    for (const file of ["ktx", "env"]) {
+      await page.selectOption("#ibl-file", file);
+      await compare("#ibl-files button", "#ibl-command");
+    }
     const cube = join(folder, "studio.dds");
     await page.selectOption("#tables-language", "glsl");
     await page.selectOption("#tables-texels", { index: 0 });

@@ -45,7 +45,7 @@ macro_rules! for_each_call {
             spheres = spheres(settings: &str, size: usize, exponent: i32) -> Result<Vec<f32>, Error>;
             targets = targets() -> String;
             prefilter = prefilter(settings: &str) -> Result<String, Error>;
-            iblFile = ibl_file(settings: &str, content: &str, container: &str) -> Result<Vec<u8>, Error>;
+            iblFile = ibl_file(settings: &str, content: &str) -> Result<Vec<u8>, Error>;
             tablesFile = tables_file(settings: &str, format: &str) -> Result<Vec<u8>, Error>;
             snippet = snippet(language: &str) -> Result<Vec<u8>, Error>;
         }

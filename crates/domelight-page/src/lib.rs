@@ -26,11 +26,11 @@ use domelight::render::Checkpoint;
 use domelight::rig::Extraction;
 
 pub use calls::{Answer, Argument};
+use domelight::rig::ibl::PrefilteredLight;
 pub use error::Error;
 use files::Files;
 pub use host::{Host, Stamp};
 pub use map::MapView;
-use prefilter::Textures;
 use session::Rendering;
 pub use session::{Statistics, Update};
 pub use setup::CameraState;
@@ -49,7 +49,7 @@ pub struct Engine {
     /// The last rig, and its settings.
     extraction: Option<(String, Extraction)>,
     /// The last prefiltered light, its settings and what there is to say of it.
-    prefiltered: Option<(String, String, Textures)>,
+    prefiltered: Option<(String, String, PrefilteredLight)>,
 }
 
 impl Engine {

@@ -1,7 +1,7 @@
 //! Light for engines and shaders: prefiltered cubes, tables, and the code that samples them.
 
 use domelight::picture::exr::ExrLayers;
-use domelight::picture::texture::{Container, TexelFormat, Texture};
+use domelight::picture::texture::{Container, RadianceFile, TexelFormat, Texture};
 use domelight::rig::ibl::{BrdfTable, Engine as Target, IblSettings, SunTreatment, prefilter};
 use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings};
 use domelight::{Rgb, RgbImage};
@@ -19,23 +19,28 @@ struct IblState {
     engine: String,
     size: usize,
     texels: String,
+    /// The extension of the radiance's file.
+    file: String,
     sun: String,
     /// The most radiance where `sun` is "clamp" \[W·m⁻²·sr⁻¹\].
     clamp: f32,
-}
-
-/// The textures of prefiltered light.
-pub(crate) struct Textures {
-    radiance: Texture,
-    irradiance: Texture,
 }
 
 /// What there is to choose from, for the page.
 #[derive(Serialize)]
 struct Offers {
     engines: Vec<&'static str>,
+    files: Vec<File>,
     languages: Vec<Language>,
     texels: usize,
+}
+
+/// A format of prefiltered light.
+#[derive(Serialize)]
+struct File {
+    extension: &'static str,
+    /// The only engine that reads it.
+    engine: Option<&'static str>,
 }
 
 #[derive(Serialize)]
@@ -79,6 +84,11 @@ impl IblState {
     fn format(&self) -> Result<TexelFormat, Error> {
         self.texels.parse().map_err(refused)
     }
+
+    fn radiance_file(&self) -> Result<RadianceFile, Error> {
+        let file = RadianceFile::of_extension(&self.file, self.format()?);
+        file.ok_or_else(|| refused(format!("there are no {} files of light", self.file)))
+    }
 }
 
 fn encoded(texture: &Texture, container: &str) -> Result<Vec<u8>, Error> {
@@ -92,14 +102,19 @@ impl Engine {
     /// The engines, the languages of shaders and the usual number of texels of tables, as JSON.
     pub fn targets(&self) -> String {
         let language = |l: ShaderLanguage| Language { name: l.name(), extension: l.extension() };
+        let file = |extension| {
+            let file = RadianceFile::of_extension(extension, TexelFormat::Half);
+            File { extension, engine: file.and_then(RadianceFile::engine).map(Target::name) }
+        };
         to_json(&Offers {
             engines: Target::ALL.map(Target::name).into(),
+            files: RadianceFile::EXTENSIONS.map(file).into(),
             languages: ShaderLanguage::ALL.map(language).into(),
             texels: TableSettings::default().texels,
         })
     }
 
-    /// Prefilters the map: `{"engine", "size", "texels", "sun", "clamp"}`; it is kept until the map changes.
+    /// Prefilters the map: `{"engine", "size", "texels", "file", "sun", "clamp"}`; it is kept until the map changes.
     ///
     /// # Errors
     /// If there is no environment, it is black, or the settings are out of range.
@@ -111,9 +126,7 @@ impl Engine {
         let treated = state.treatment()?.apply(self.environment()?).map_err(refused)?;
         let settings = IblSettings::for_engine(state.target()?, state.size);
         let light = prefilter(&treated.environment, &settings).map_err(refused)?;
-        let texels = state.format()?;
-        let (radiance, clipped) = Texture::cube(&light.levels, texels);
-        let (irradiance, _) = Texture::cube(std::slice::from_ref(&light.irradiance), texels);
+        let clipped = state.radiance_file()?.clipped(&light);
         let report = IblReport {
             levels: light.levels.len(),
             clipped: clipped.texels,
@@ -121,27 +134,33 @@ impl Engine {
             clamped: treated.clamped,
         };
         let report = to_json(&report);
-        let textures = Textures { radiance, irradiance };
-        self.prefiltered = Some((json.to_owned(), report.clone(), textures));
+        self.prefiltered = Some((json.to_owned(), report.clone(), light));
         Ok(report)
     }
 
-    /// A file of the light that was prefiltered with the settings in `json`: `radiance`, `irradiance` or `brdf` as `ktx2`
-    /// or `dds`.
+    /// A file of the light that was prefiltered with the settings in `json`: `radiance`, or as `ktx2` or `dds` `irradiance` or
+    /// `brdf`.
     ///
     /// # Errors
     /// If something else was prefiltered, or there is no such file.
-    pub fn ibl_file(&self, json: &str, content: &str, container: &str) -> Result<Vec<u8>, Error> {
+    pub fn ibl_file(&self, json: &str, content: &str) -> Result<Vec<u8>, Error> {
+        let state: IblState = parse(json)?;
         if content == "brdf" {
-            let state: IblState = parse(json)?;
             let table = BrdfTable::new(BrdfTable::SIZE, Target::terms(state.target()?));
-            return encoded(&Texture::table(&table), container);
+            return encoded(&Texture::table(&table), &state.file);
         }
         let kept = self.prefiltered.as_ref().filter(|(of, ..)| of == json);
-        let (_, _, textures) = kept.ok_or_else(|| refused("this light was not prefiltered"))?;
+        let (_, _, light) = kept.ok_or_else(|| refused("this light was not prefiltered"))?;
         match content {
-            "radiance" => encoded(&textures.radiance, container),
-            "irradiance" => encoded(&textures.irradiance, container),
+            "radiance" => {
+                let mut bytes = Vec::new();
+                state.radiance_file()?.encode(light, &mut bytes).map_err(refused)?;
+                Ok(bytes)
+            }
+            "irradiance" => {
+                let irradiance = std::slice::from_ref(&light.irradiance);
+                encoded(&Texture::cube(irradiance, state.format()?).0, &state.file)
+            }
             _ => Err(refused(format!("there is no texture {content}"))),
         }
     }

@@ -21,7 +21,7 @@ export interface BuiltinScene {
 
 /** A program, for how it orients a lat-long map. */
 export type Convention =
-  "blender" | "mitsuba" | "pbrt" | "usd" | "gltf" | "three" | "babylon" | "unreal" | "unity" | "godot" | "radiance" | "nvdiffrec";
+  "blender" | "mitsuba" | "pbrt" | "usd" | "gltf" | "three" | "babylon" | "unreal" | "unity" | "godot" | "bevy" | "filament" | "radiance" | "nvdiffrec";
 
 /** The options of `load`. */
 export interface LoadOptions {

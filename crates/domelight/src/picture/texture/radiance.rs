@@ -28,6 +28,9 @@ pub enum RadianceFileError {
 }
 
 impl RadianceFile {
+    /// The extensions of all formats.
+    pub const EXTENSIONS: [&str; 4] = ["ktx2", "dds", "ktx", "env"];
+
     /// The format whose files have this extension, in any case. `texels` is the format of texels in a cube texture.
     pub fn of_extension(extension: &str, texels: TexelFormat) -> Option<Self> {
         match extension.to_ascii_lowercase().as_str() {
@@ -172,6 +175,7 @@ mod tests {
         assert_eq!(of("KTX"), Some(RadianceFile::Filament));
         assert_eq!(of("env"), Some(RadianceFile::Babylon));
         assert_eq!(of("Dds"), Some(RadianceFile::Texture(Container::Dds, TexelFormat::Half)));
+        assert!(RadianceFile::EXTENSIONS.into_iter().all(|extension| of(extension).is_some()));
         assert_eq!(of("png"), None);
         assert!(RadianceFile::Babylon.check(48).unwrap_err().to_string().contains("not 48"));
         assert!(RadianceFile::Filament.check(48).is_ok());
