@@ -162,3 +162,37 @@ fn a_single_texel_and_repaired_maps_are_filtered() {
     let repaired = domelight(&folder, &["ibl", "bad.exr", "--size", "3", "-o", "bad.ktx2"]);
     assert!(warning(&repaired).contains("repaired"), "{}", stderr(&repaired));
 }
+
+/// A cube for an engine, with the engine named, is the cube for none.
+#[test]
+fn cubes_for_engines_are_turned_back() {
+    let folder = probes();
+    done(&domelight(&folder, &["conventions", "--size", "64", "-o", "axes.exr"]));
+    let cube = |more: &[&str]| {
+        let format = ["ibl", "axes.exr", "--size", "32", "--texels", "half", "-q", "-o"];
+        done(&domelight(&folder, &[&format[..], more].concat()));
+    };
+    let read = |name: &str, more: &[&str]| {
+        let probe =
+            ["probe", name, "--to", "cube-strip-vertical", "--size", "64", "-q", "-o", "map.pfm"];
+        done(&domelight(&folder, &[&probe[..], more].concat()));
+        fs::read(folder.path().join("map.pfm")).unwrap()
+    };
+    cube(&["plain.ktx2"]);
+    let expected = read("plain.ktx2", &[]);
+    done(&domelight(&folder, &["probe", "plain.ktx2", "-q", "-o", "plain.pfm"]));
+    for engine in ["three", "filament", "babylon", "godot", "bevy", "unreal"] {
+        for name in ["cube.ktx2", "cube.dds"] {
+            cube(&[name, "--for", engine]);
+            assert_ne!(read(name, &[]), expected, "{engine}");
+            assert_eq!(read(name, &["--cube-for", engine]), expected, "{engine}, {name}");
+        }
+        // As a panorama stands in the engine's convention, so does the cube.
+        let rig = |map: &str| {
+            let convention = ["--env-convention", engine, "-n", "4", "-q", "-o", "rig.csv"];
+            done(&domelight(&folder, &[&["lights", map], &convention[..]].concat()));
+            fs::read_to_string(folder.path().join("rig.csv")).unwrap()
+        };
+        assert_eq!(rig("cube.ktx2"), rig("plain.pfm"), "{engine}");
+    }
+}

@@ -7,6 +7,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::convention::Convention;
 use domelight::environment::io::{ProbeOptions, probe_from_bytes, reduced_probe_from_bytes};
 use domelight::environment::{Environment, EnvironmentError, Orientation, UpAxis, radiance_factor};
+use domelight::rig::ibl::Engine;
 use domelight::rig::{SphericalGaussians, SphericalHarmonics};
 use domelight::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
@@ -104,8 +105,13 @@ impl MapOptions {
             layer: self.layer.clone(),
             strict: self.strict,
             max_memory: Some(MAX_MEMORY),
+            cube_axes: self.program()?.and_then(Engine::of_convention).map(|engine| engine.axes().world),
             ..ProbeOptions::default()
         })
+    }
+
+    fn program(&self) -> Result<Option<Convention>, JsError> {
+        option("convention", self.convention.as_deref())
     }
 
     /// The light of a map whose orientation these options are.
@@ -115,7 +121,7 @@ impl MapOptions {
         name: &str,
         warnings: Vec<String>,
     ) -> Result<LightMap, JsError> {
-        let convention: Option<Convention> = option("convention", self.convention.as_deref())?;
+        let convention = self.program()?;
         let image = match convention {
             Some(program) => program.from_program(image),
             None => image,

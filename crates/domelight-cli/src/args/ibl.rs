@@ -69,7 +69,7 @@ pub(crate) struct IblArguments {
     pub(crate) texels: Option<TexelFormat>,
 }
 
-fn engine() -> impl TypedValueParser<Value = Engine> {
+pub(super) fn engine() -> impl TypedValueParser<Value = Engine> {
     one_of(Engine::ALL.map(Engine::name))
 }
 

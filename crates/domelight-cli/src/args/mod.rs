@@ -22,6 +22,7 @@ use domelight::environment::convention::Convention;
 use domelight::environment::io::Window;
 use domelight::environment::mapping::{CubeFaces, Mapping};
 use domelight::picture::tone::ToneCurve;
+use domelight::rig::ibl::Engine;
 use domelight_lab::job::Tone;
 use domelight_lab::job::value::{Choice, Count};
 use std::path::PathBuf;
@@ -365,6 +366,9 @@ pub(crate) struct ProbeArguments {
     /// Turn the lat-long output so that it stands in PROGRAM as it stands here (domelight conventions lists programs).
     #[arg(long = "for", id = "for_program", value_name = "PROGRAM", requires = "output")]
     pub(crate) for_program: Option<Choice<Convention>>,
+    /// Engine for which a cube texture was made (domelight ibl --for): it is turned back.
+    #[arg(long, value_name = "ENGINE", value_parser = ibl::engine())]
+    pub(crate) cube_for: Option<Engine>,
     /// Write the probe (.exr, .hdr, .pfm, .png; - writes OpenEXR to standard output).
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PicturePath>,

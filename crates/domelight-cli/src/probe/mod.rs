@@ -139,6 +139,7 @@ fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
         faces: arguments.faces,
         window: arguments.window.map(|Choice(window)| window),
         layer: arguments.layer.clone(),
+        cube_axes: arguments.cube_for.map(|engine| engine.axes().world),
         strict: arguments.strict,
         max_memory: memory::left(),
     };

@@ -10,7 +10,9 @@ use domelight::environment::convention::Convention;
 use domelight::environment::io::{ProbeError, ProbeOptions, Window};
 use domelight::environment::mapping::{CubeFaces, Mapping};
 use domelight::environment::{Environment, UpAxis};
+use domelight::math::Vec3;
 use domelight::picture::{PictureError, PictureErrorKind};
+use domelight::rig::ibl::Engine;
 use domelight::scene::{EnvironmentSettings, EnvironmentSource, LoadError, SceneDescription};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -138,6 +140,7 @@ impl Light {
             faces: self.faces.map(|Text(faces)| faces),
             window: self.window.map(|Choice(window)| window),
             layer: self.layer.clone(),
+            cube_axes: self.convention.and_then(|Choice(program)| cube_axes(program)),
             strict: self.strict,
             max_memory: host.memory_left(),
         };
@@ -157,6 +160,11 @@ impl Light {
             None => map,
         }
     }
+}
+
+/// What a cube texture shows at its axes, if it was made for a program that takes cubes.
+fn cube_axes(program: Convention) -> Option<[Vec3; 3]> {
+    Engine::of_convention(program).map(|engine| engine.axes().world)
 }
 
 /// An error in loading a probe, with the line of the scene file that names it, if there is one.

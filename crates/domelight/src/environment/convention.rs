@@ -33,6 +33,8 @@ pub enum Convention {
     Unity,
     /// Godot's panorama sky.
     Godot,
+    /// Bevy, whose panoramas become cubes.
+    Bevy,
     /// Filament's `cmgen`.
     Filament,
     /// A Radiance source with a lat-long picture, as domelight writes it.
@@ -75,7 +77,7 @@ pub struct Indivisible {
 
 impl Convention {
     /// All programs.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Blender,
         Self::Mitsuba,
         Self::Pbrt,
@@ -86,6 +88,7 @@ impl Convention {
         Self::Unreal,
         Self::Unity,
         Self::Godot,
+        Self::Bevy,
         Self::Filament,
         Self::Radiance,
         Self::Nvdiffrec,
@@ -104,6 +107,7 @@ impl Convention {
             Self::Unreal => "unreal",
             Self::Unity => "unity",
             Self::Godot => "godot",
+            Self::Bevy => "bevy",
             Self::Filament => "filament",
             Self::Radiance => "radiance",
             Self::Nvdiffrec => "nvdiffrec",
@@ -119,7 +123,7 @@ impl Convention {
     /// The same in quarter turns, counterclockwise as seen from above: 1 has the center column on the left.
     fn quarter_turns(self) -> usize {
         match self {
-            Self::Unreal | Self::Radiance | Self::Nvdiffrec => 0,
+            Self::Unreal | Self::Bevy | Self::Radiance | Self::Nvdiffrec => 0,
             Self::Pbrt | Self::Unity => 1,
             Self::Mitsuba | Self::Usd | Self::Babylon | Self::Godot | Self::Filament => 2,
             Self::Blender | Self::Gltf | Self::Three => 3,
@@ -139,6 +143,7 @@ impl Convention {
             | Self::Unreal
             | Self::Unity
             | Self::Godot
+            | Self::Bevy
             | Self::Filament
             | Self::Radiance
             | Self::Nvdiffrec => false,
@@ -158,7 +163,7 @@ impl Convention {
             Self::Unreal => "½ + atan2(x, −y)/2π, z up, left-handed",
             Self::Unity => "½ − atan2(z, x)/2π, y up, left-handed",
             Self::Radiance => "½ + atan2(x, y)/2π, z up",
-            Self::Nvdiffrec => "½ + atan2(x, −z)/2π, y up",
+            Self::Bevy | Self::Nvdiffrec => "½ + atan2(x, −z)/2π, y up",
         }
     }
 
@@ -170,7 +175,7 @@ impl Convention {
             Self::Pbrt => "−X",
             Self::Radiance => "+Y",
             Self::Unreal => "−Y",
-            Self::Nvdiffrec => "−Z",
+            Self::Bevy | Self::Nvdiffrec => "−Z",
         }
     }
 
@@ -187,6 +192,7 @@ impl Convention {
             Self::Unreal => "TextureCompressorModule.cpp; its importers exchange y and z",
             Self::Unity => "Skybox-Panoramic.shader; glTF exporters negate x",
             Self::Godot => "sky.glsl",
+            Self::Bevy => "environment_map.wgsl looks cubes up with −z",
             Self::Filament => "cmgen's cubes",
             Self::Radiance => "the brightness function that domelight writes",
             Self::Nvdiffrec => "render/util.py, cubemap_to_latlong",
@@ -203,9 +209,12 @@ impl Convention {
             | Self::Filament
             | Self::Radiance => Proof::Program,
             Self::Pbrt | Self::Usd => Proof::Format,
-            Self::Gltf | Self::Unreal | Self::Unity | Self::Godot | Self::Nvdiffrec => {
-                Proof::Source
-            }
+            Self::Gltf
+            | Self::Unreal
+            | Self::Unity
+            | Self::Godot
+            | Self::Bevy
+            | Self::Nvdiffrec => Proof::Source,
         }
     }
 
@@ -360,7 +369,9 @@ mod tests {
             Convention::Babylon => 0.5 + (-x).atan2(z) / TAU,
             Convention::Unity => 0.5 - z.atan2(-x) / TAU,
             Convention::Radiance => 0.5 + x.atan2(y) / TAU,
-            Convention::Unreal | Convention::Nvdiffrec => 0.5 + x.atan2(-z) / TAU,
+            Convention::Unreal | Convention::Bevy | Convention::Nvdiffrec => {
+                0.5 + x.atan2(-z) / TAU
+            }
         }
     }
 

@@ -7,8 +7,11 @@
 pub use super::guess::Guess;
 pub use super::repair::{OVERFLOWED, SanitizeReport, sanitize};
 
-use super::mapping::{CubeFaces, Fisheye, Mapping, ShapeError, fisheye_to_lat_long, to_lat_long};
+use super::mapping::{
+    CubeFaces, CubeLayout, Fisheye, Mapping, ShapeError, fisheye_to_lat_long, to_lat_long,
+};
 use super::repair::finite_light;
+use crate::math::{Mat3, Vec3, vec2};
 use crate::memory;
 use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
 use crate::{Rgb, RgbImage};
@@ -26,6 +29,9 @@ pub struct ProbeOptions {
     pub window: Option<Window>,
     /// The OpenEXR layer; see [`ReadOptions::layer`].
     pub layer: Option<String>,
+    /// The world directions that a cube texture shows at +X, +Y and +Z: an engine's
+    /// [`CubeAxes::world`](crate::rig::ibl::CubeAxes::world); by default these axes themselves.
+    pub cube_axes: Option<[Vec3; 3]>,
     /// Whether to reject negative and non-finite values instead of repairing them.
     pub strict: bool,
     /// The maximum memory for reading; see [`ReadOptions::max_memory`].
@@ -232,6 +238,9 @@ pub fn probe_from_picture(
         };
         image = faces.arranged(&image, layout);
     }
+    if let (Some(axes), Format::Ktx2 | Format::Dds) = (options.cube_axes, picture.format) {
+        image = in_world(&image, axes);
+    }
     if options.strict {
         require_radiance(&image, file)?;
     }
@@ -272,6 +281,21 @@ fn fisheye(picture: &picture::Picture, options: &ProbeOptions) -> Option<Fisheye
     let is_free = options.mapping.is_none() && options.faces.is_none();
     let is_square = picture.image.width == picture.image.height;
     picture.fisheye.filter(|&view| is_free && is_square && view != Fisheye::WHOLE)
+}
+
+/// The strip of a cube texture's faces, with the texels where the world has them.
+fn in_world(strip: &RgbImage, [x, y, z]: [Vec3; 3]) -> RgbImage {
+    let to_cube = Mat3::from_cols(x, y, z).transpose();
+    let mapping = Mapping::Cube(CubeLayout::StripVertical);
+    let (width, height) = (strip.width, strip.height);
+    RgbImage::from_fn(width, height, |x, y| {
+        let center = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+        let Some(world) = mapping.direction(center) else { return Rgb::BLACK };
+        // Axes change places, so the middle of a texel becomes that of another.
+        let uv = mapping.uv(to_cube * world);
+        let [x, y] = [uv.x * width as f32, uv.y * height as f32].map(|c| c as usize);
+        strip.get(x.min(width - 1), y.min(height - 1))
+    })
 }
 
 /// Puts the picture into its display window, if that is the map. Returns a warning where nobody said which it is and

@@ -4,6 +4,7 @@
 
 use super::brdf::TableTerms;
 use super::cube::CubeAxes;
+use crate::environment::convention::Convention;
 use crate::math::{Vec3, functions};
 use crate::names::read_by_name;
 
@@ -58,6 +59,26 @@ impl Engine {
             Self::Godot => "godot",
             Self::Bevy => "bevy",
             Self::Unreal => "unreal",
+        }
+    }
+
+    /// The engine whose panoramas have this convention; `None` for programs that take no cubes.
+    pub const fn of_convention(convention: Convention) -> Option<Self> {
+        match convention {
+            Convention::Three => Some(Self::Three),
+            Convention::Filament => Some(Self::Filament),
+            Convention::Babylon => Some(Self::Babylon),
+            Convention::Godot => Some(Self::Godot),
+            Convention::Bevy => Some(Self::Bevy),
+            Convention::Unreal => Some(Self::Unreal),
+            Convention::Blender
+            | Convention::Mitsuba
+            | Convention::Pbrt
+            | Convention::Usd
+            | Convention::Gltf
+            | Convention::Unity
+            | Convention::Radiance
+            | Convention::Nvdiffrec => None,
         }
     }
 
@@ -139,6 +160,8 @@ mod tests {
             };
             assert_eq!(handedness, expected, "{}", engine.name());
             assert_eq!(engine.name().parse(), Ok(engine));
+            let convention = engine.name().parse().unwrap();
+            assert_eq!(Engine::of_convention(convention), Some(engine));
         }
     }
 
