@@ -105,7 +105,10 @@ impl MapOptions {
             layer: self.layer.clone(),
             strict: self.strict,
             max_memory: Some(MAX_MEMORY),
-            cube_axes: self.program()?.and_then(Engine::of_convention).map(|engine| engine.axes().world),
+            cube_axes: self
+                .program()?
+                .and_then(Engine::of_convention)
+                .map(|engine| engine.axes().world),
             ..ProbeOptions::default()
         })
     }
