@@ -86,5 +86,25 @@ for (let i = 0; i < 24; i++) {
 const sorted = [...previews].sort((a, b) => a - b);
 line("first picture of a new view", `median ${median(previews)} ms, ${sorted[0]} to ${sorted.at(-1)} ms`);
 line("tasks of the main thread over 50 ms, orbiting", await both());
+
+// A drag around the scene, as fast as the page draws frames.
+await page.evaluate(() => {
+  window.intervals = [];
+  let last = performance.now();
+  const next = (now) => { window.intervals.push(now - last); last = now; requestAnimationFrame(next); };
+  requestAnimationFrame(next);
+});
+const box = await page.locator("#viewer").boundingBox();
+const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+await page.mouse.move(x, y);
+await page.mouse.down();
+for (let i = 0; i < 180; i++) {
+  await page.mouse.move(x + 100 * Math.sin(i / 20), y);
+  await page.waitForTimeout(16);
+}
+await page.mouse.up();
+const frames = (await page.evaluate(() => window.intervals)).slice(1).sort((a, b) => a - b);
+const quantile = (q) => frames[Math.floor(q * (frames.length - 1))].toFixed(1);
+line("time between frames, dragging", `median ${quantile(0.5)} ms, 95 % under ${quantile(0.95)} ms, of ${frames.length}`);
 await done();
 await close();

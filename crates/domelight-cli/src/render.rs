@@ -6,10 +6,10 @@ use std::sync::atomic::Ordering;
 use anyhow::{Context as _, Result};
 use domelight::picture::tone::ToneMapping;
 use domelight::render::{
-    Film, Layers, RenderSettings, Rendering, automatic_exposure, pilot_points, portals,
+    Film, Layers, RenderSettings, Rendering, automatic_exposure, pilot_points,
 };
-use domelight::scene::Camera;
-use domelight::strategy::PreparedStrategy;
+use domelight::scene::{Camera, Scene};
+use domelight::strategy::{Portal, PreparedStrategy};
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::clock;
@@ -179,7 +179,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         report.png = Some(Shown::new(&job.output, &shown_as).metered(automatic.basis));
     }
     if arguments.output.json {
-        report.found_portals = found_portals(view, settings);
+        report.found_portals = portal_text(&rendering.found_portals, scene);
         report.print_json()?;
     } else if !quiet {
         report.print_summary();
@@ -256,10 +256,7 @@ impl OutputArguments {
     }
 }
 
-/// The portals that a render finds because the scene names none, in the notation of `--portal`.
-fn found_portals(view: &PreparedScene, settings: &RenderSettings) -> Option<String> {
-    let PreparedScene { scene, camera, .. } = view;
-    let found = portals(scene, camera, settings);
-    let is_found = scene.portals().is_empty() && !found.is_empty();
-    is_found.then(|| PortalList::of(&found, scene).to_string())
+/// Portals that a render found, in the notation of `--portal`.
+fn portal_text(found: &[Portal], scene: &Scene) -> Option<String> {
+    (!found.is_empty()).then(|| PortalList::of(found, scene).to_string())
 }

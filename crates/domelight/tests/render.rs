@@ -238,7 +238,7 @@ fn noisy_pixels_get_more_camera_samples() {
     assert!(even.iter().all(|&n| n == 40 || n == 80));
     let second = even.iter().filter(|&&n| n == 80).count();
     assert!((10..50).contains(&second), "{second}");
-    let Rendering { layers, counts, complete } = picture(true);
+    let Rendering { layers, counts, complete, .. } = picture(true);
     assert!(complete);
     let [least, most] = [layers.n_samples.iter().min(), layers.n_samples.iter().max()];
     assert!(least < Some(&40) && most > Some(&40), "{least:?} {most:?}");
@@ -389,7 +389,7 @@ fn layers_mean_what_they_say() {
         n_samples: 16,
         ..small()
     };
-    let Rendering { layers, counts, complete } =
+    let Rendering { layers, counts, complete, .. } =
         draw(&scene, &environment, &mis(&environment), &settings);
     assert!(complete);
     assert_eq!(counts.camera_rays, 45 * 37 * 16);

@@ -1,6 +1,6 @@
 //! One picture and what it cost.
 
-use domelight::render::{Counts, Layers, Observer, RenderSettings, Renderer};
+use domelight::render::{Counts, Layers, Observer, RenderSettings, Renderer, Rendering};
 use domelight::strategy::Strategy;
 
 use super::work::WorkStage;
@@ -10,7 +10,7 @@ use crate::{Error, Host};
 
 /// A strategy of any type, which renders pictures of a view.
 pub(crate) trait Picturing {
-    /// The picture and what was done for it; none if the observer ended it.
+    /// The picture and what was done for it, rays ahead of it included; none if the observer ended it.
     fn picture(
         &self,
         view: PreparedSceneRef,
@@ -29,8 +29,9 @@ impl<S: Strategy> Picturing for S {
         let PreparedSceneRef { scene, camera, environment, .. } = view;
         let mut renderer = Renderer::with_strategy(scene, camera, environment, self, *settings);
         let complete = renderer.run(observer);
-        let rendering = renderer.rendering();
-        complete.then_some((rendering.layers, rendering.counts))
+        let Rendering { layers, mut counts, .. } = renderer.rendering();
+        counts.shadow_rays += renderer.rays_ahead();
+        complete.then_some((layers, counts))
     }
 }
 

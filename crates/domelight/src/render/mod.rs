@@ -256,6 +256,8 @@ pub struct Rendering {
     pub counts: Counts,
     /// Whether all samples of all pixels were taken.
     pub complete: bool,
+    /// The portals that were found, in units of [`Scene::unit`]; see [`portals`].
+    pub found_portals: Vec<Portal>,
 }
 
 /// The data shared by all tiles.

@@ -72,26 +72,37 @@ pub fn portals<'a>(
     camera: &Camera,
     settings: &RenderSettings,
 ) -> Cow<'a, [Portal]> {
+    counted_portals(scene, camera, settings).0
+}
+
+/// [`portals`] and the number of rays that were sent for them.
+pub(super) fn counted_portals<'a>(
+    scene: &'a Scene,
+    camera: &Camera,
+    settings: &RenderSettings,
+) -> (Cow<'a, [Portal]>, u64) {
     if scene.portals().is_empty() && settings.find_portals {
-        Cow::Owned(find(scene, camera, settings))
+        let (found, n_rays) = find(scene, camera, settings);
+        (Cow::Owned(found), n_rays)
     } else {
-        Cow::Borrowed(scene.portals())
+        (Cow::Borrowed(scene.portals()), 0)
     }
 }
 
-fn find(scene: &Scene, camera: &Camera, settings: &RenderSettings) -> Vec<Portal> {
+fn find(scene: &Scene, camera: &Camera, settings: &RenderSettings) -> (Vec<Portal>, u64) {
     let points = pilot_points(scene, camera, settings);
     let first = send(scene, &points, 0..FIRST_RAYS);
     let free = |beams: &[Beam]| beams.iter().filter(|beam| beam.is_free).count();
     if free(&first) as f64 > OPEN * first.len() as f64 {
-        return Vec::new();
+        return (Vec::new(), first.len() as u64);
     }
     let walls = blockers(scene, &first);
     let beams = [first, send(scene, &points, FIRST_RAYS..RAYS)].concat();
+    let n_rays = (beams.len() + walls.len()) as u64;
     if free(&beams) < FEWEST || free(&beams) as f64 > OPEN * beams.len() as f64 {
-        return Vec::new();
+        return (Vec::new(), n_rays);
     }
-    Search::new(&beams, &walls).map_or_else(Vec::new, Search::run)
+    (Search::new(&beams, &walls).map_or_else(Vec::new, Search::run), n_rays)
 }
 
 /// A ray from a point.
@@ -472,7 +483,9 @@ fn axes(normal: Vec3, orientations: &[Vec3]) -> [Vec3; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::environment::{Environment, Orientation, builtin::BuiltinProbe};
     use crate::math::{Mat4, vec3};
+    use crate::render::Renderer;
     use crate::scene::builtin::BuiltinScene;
     use crate::scene::{Part, SceneDescription};
 
@@ -522,6 +535,20 @@ mod tests {
     fn named_portals_are_kept() {
         let [scene, _] = rooms(&Mat4::IDENTITY);
         assert_eq!(found(&scene), scene.portals());
+    }
+
+    #[test]
+    fn only_strategies_that_sample_portals_look_for_them() {
+        let [_, scene] = rooms(&Mat4::IDENTITY);
+        let environment =
+            Environment::new(BuiltinProbe::Sky.image(16), Orientation::default(), 1.0).unwrap();
+        let settings = RenderSettings { width: 64, height: 48, ..RenderSettings::default() };
+        let camera = Camera::framing(&scene, settings.width, settings.height);
+        for (strategy, n) in [("mis:1:1", 0), ("mis:1:1:portals=2", 1), ("product:4", 1)] {
+            let spec = strategy.parse().unwrap();
+            let renderer = Renderer::new(&scene, &camera, &environment, spec, settings).unwrap();
+            assert_eq!(renderer.rendering().found_portals.len(), n, "{strategy}");
+        }
     }
 
     /// Open scenes, closed rooms and holes that rays do not find have none.

@@ -1,6 +1,7 @@
 //! The progressive renderer renders a picture pass by pass. A render can be watched, interrupted, saved, resumed, and
 //! divided into shards.
 
+use std::borrow::Cow;
 use std::ops::{Deref, Range};
 
 use rayon::prelude::*;
@@ -8,12 +9,13 @@ use rayon::prelude::*;
 use super::film::{Film, FilmMismatch};
 use super::filter::FilterSampler;
 use super::layers::Layers;
+use super::openings::counted_portals;
 use super::scouts::scout;
 use super::sums::PixelSums;
 use super::tile::{Counts, Mark, Pass, Scratch, Tile};
 use super::tiling::{SampleSet, Tiling, Window, paired_pass};
 use super::variance::VarianceSums;
-use super::{Catcher, Observer, RenderContext, RenderSettings, Rendering, portals};
+use super::{Catcher, Observer, RenderContext, RenderSettings, Rendering};
 use crate::environment::Environment;
 use crate::sampling::Sampler;
 use crate::scene::{Camera, Scene};
@@ -57,7 +59,8 @@ pub struct Renderer<'a, S: Strategy = PreparedStrategy<'a>> {
     mark: Mark,
     /// The pass that the observer ended, to be continued.
     interrupted: Option<(u32, Pass<S>)>,
-    scout_rays: u64,
+    /// See [`Renderer::rays_ahead`].
+    rays_ahead: u64,
 }
 
 /// A strategy owned by the renderer, or the caller's.
@@ -146,7 +149,11 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         settings: RenderSettings,
     ) -> Self {
         let filter = FilterSampler::new(settings.filter);
-        let portals = portals(scene, camera, &settings);
+        let (portals, rays_ahead) = if strategy.samples_portals() {
+            counted_portals(scene, camera, &settings)
+        } else {
+            (Cow::Borrowed(scene.portals()), 0)
+        };
         let (camera, extent) = (scene.camera_inside(camera), scene.extent());
         let catcher = Catcher::of(scene, environment);
         let context = RenderContext {
@@ -159,7 +166,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
             portals,
             catcher,
         };
-        Self::of_context(context, strategy)
+        Self { rays_ahead, ..Self::of_context(context, strategy) }
     }
 
     fn of_context(context: RenderContext<'a>, strategy: Held<'a, S>) -> Self {
@@ -174,7 +181,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
             before: Counts::default(),
             mark: Mark::default(),
             interrupted: None,
-            scout_rays: 0,
+            rays_ahead: 0,
         };
         empty.only(0..tiling.n_tiles())
     }
@@ -265,7 +272,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
             Some((of, pass)) if of == start && pass.n_samples <= most => pass,
             _ => {
                 let (pass, scout_rays) = self.begin_pass(start, most);
-                self.scout_rays += scout_rays;
+                self.rays_ahead += scout_rays;
                 pass
             }
         };
@@ -386,10 +393,10 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self.tiles.iter().fold(self.before, |sum, tile| sum + tile.counts)
     }
 
-    /// The shadow rays of scouts, which this renderer sent ahead of passes of a strategy that learns. They are no part of
-    /// [`Self::counts`], because each part of a picture sends them.
-    pub fn scout_rays(&self) -> u64 {
-        self.scout_rays
+    /// The rays that this renderer sent ahead of its pictures: to find portals, and by scouts for a strategy that learns.
+    /// They are no part of [`Self::counts`], because each part of a picture sends them.
+    pub fn rays_ahead(&self) -> u64 {
+        self.rays_ahead
     }
 
     /// The sums of all pixels so far.
@@ -499,6 +506,10 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         for tile in self.tiles.iter().chain(&self.coarse_tiles()) {
             tile.put_into(&mut layers, window, &variance);
         }
-        Rendering { layers, counts: self.counts(), complete: self.is_complete() }
+        let found_portals = match &self.context.portals {
+            Cow::Borrowed(_) => Vec::new(),
+            Cow::Owned(found) => found.clone(),
+        };
+        Rendering { layers, counts: self.counts(), complete: self.is_complete(), found_portals }
     }
 }

@@ -211,6 +211,11 @@ pub trait PointStrategy: Sync {
         1.0
     }
 
+    /// Whether [`TileShading::portals`] matter; see [`Strategy::samples_portals`].
+    fn samples_portals(&self) -> bool {
+        false
+    }
+
     /// Calls `push(wi, weight)` for each shadow ray at the point.
     fn sample(
         &self,
@@ -337,6 +342,11 @@ pub trait Strategy: Sync {
         1.0
     }
 
+    /// Whether [`TileShading::portals`] matter. If not, a render looks for none.
+    fn samples_portals(&self) -> bool {
+        false
+    }
+
     /// The number of camera samples per pixel that a pass should have, for strategies that place the rays of
     /// all of them together; `None` if it does not matter.
     fn samples_per_pass(&self) -> Option<u32> {
@@ -391,6 +401,10 @@ impl<S: PointStrategy> Strategy for S {
 
     fn unit(&self) -> f64 {
         PointStrategy::unit(self)
+    }
+
+    fn samples_portals(&self) -> bool {
+        PointStrategy::samples_portals(self)
     }
 
     fn begin_pass(&self, _: Sampler, _: u32) {}

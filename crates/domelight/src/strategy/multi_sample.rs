@@ -63,6 +63,10 @@ macro_rules! point_strategy_of_samples {
                 samples.n_light.n + samples.n_brdf.n + samples.n_portal.n
             }
 
+            fn samples_portals(&self) -> bool {
+                self.samples().n_portal.n > 0
+            }
+
             fn sample(
                 &self,
                 at: &$crate::strategy::ShadingPoint,
@@ -125,6 +129,19 @@ impl MultiSample<'_> {
         out: &mut Contributions,
     ) {
         let portals = Portals::new(tile.portals);
+        self.each_point(tile, portals, scratch, |(point, ..), samples| {
+            samples.each().for_each(|(wi, weight)| out.push(point, wi, weight));
+        });
+    }
+
+    /// Calls `each` with each point of a tile and its samples, which are drawn for several points side by side.
+    pub(super) fn each_point(
+        &self,
+        tile: &TileShading,
+        portals: Portals,
+        scratch: &mut SampleScratch,
+        mut each: impl FnMut((u32, &ShadingPoint, SampleIndex), PointSamples),
+    ) {
         let mut points = tile.each_point();
         // Take the next points, of any pixels.
         while let Some(first) = points.next() {
@@ -136,10 +153,8 @@ impl MultiSample<'_> {
             let (at, samples) = (batch.map(|(_, at, _)| at), batch.map(|(_, _, sample)| sample));
             let numbers = SampleLanes::Points(&samples[..n]);
             self.draw_all(tile.instruction_set, portals, &at[..n], numbers, scratch);
-            for (lane, &(point, ..)) in batch[..n].iter().enumerate() {
-                for row in &scratch.rows {
-                    out.push(point, row.wi(lane), row.weight(lane));
-                }
+            for (lane, &point) in batch[..n].iter().enumerate() {
+                each(point, PointSamples { rows: &scratch.rows, lane });
             }
         }
     }
@@ -256,6 +271,20 @@ impl MultiSample<'_> {
 #[derive(Clone, Debug, Default)]
 pub struct SampleScratch {
     rows: Vec<Row>,
+}
+
+/// The samples of one of the points side by side.
+#[derive(Clone, Copy)]
+pub(super) struct PointSamples<'a> {
+    rows: &'a [Row],
+    lane: usize,
+}
+
+impl<'a> PointSamples<'a> {
+    /// Directions and weights, including black ones.
+    pub(super) fn each(self) -> impl Iterator<Item = (Vec3, Rgb)> + use<'a> {
+        self.rows.iter().map(move |row| (row.wi(self.lane), row.weight(self.lane)))
+    }
 }
 
 /// Samples side by side.

@@ -231,6 +231,10 @@ impl Strategy for PreparedStrategy<'_> {
         each!(self, s => Strategy::n_rays(s))
     }
 
+    fn samples_portals(&self) -> bool {
+        each!(self, s => Strategy::samples_portals(s))
+    }
+
     fn samples_per_pass(&self) -> Option<u32> {
         each!(self, s => s.samples_per_pass())
     }

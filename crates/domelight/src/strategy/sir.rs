@@ -35,6 +35,8 @@
 //! sequence).
 
 use super::multi_sample::{Count, MultiSample, SampleScratch};
+use super::point_lanes::MOST_LANES;
+use super::portal::Portals;
 use super::{Contributions, PointStrategy, SampleIndex, ShadingPoint, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
@@ -42,7 +44,7 @@ use crate::math::{Vec3, functions};
 use crate::sampling::hilbert::hemisphere_index;
 use crate::sampling::rng::hash2;
 use crate::sampling::{
-    Dimension, Heuristic, ONE_MINUS_EPSILON, Sampler, SamplerKind, WeightedReservoirs,
+    Dimension, Heuristic, ONE_MINUS_EPSILON, Pcg32, Sampler, SamplerKind, WeightedReservoirs,
 };
 use crate::simd::InstructionSet;
 
@@ -116,6 +118,12 @@ struct Candidate {
 #[derive(Clone, Debug, Default)]
 pub struct SirScratch {
     samples: SampleScratch,
+    picking: PickScratch,
+}
+
+/// The candidates of a point, and scratch memory to pick from them.
+#[derive(Clone, Debug, Default)]
+struct PickScratch {
     candidates: Vec<Candidate>,
     /// The position on the curve in the upper half, the index of the candidate in the lower half.
     order: Vec<u64>,
@@ -127,50 +135,53 @@ pub struct SirScratch {
 impl SamplingImportanceResampling<'_> {
     /// The samples that become candidates at one point.
     fn samples(&self, sample_index: SampleIndex) -> MultiSample<'_> {
-        let (m, n) = self.candidates.split(self.n_candidates);
-        let [mut n_light, mut n_brdf] = [Count::fixed(m), Count::fixed(n)];
-        if m + n < self.n_candidates {
-            for count in [&mut n_light, &mut n_brdf] {
+        let mut samples = self.even_samples();
+        let MultiSample { n_light, n_brdf, .. } = &mut samples;
+        let m = n_light.n;
+        if m + n_brdf.n < self.n_candidates {
+            for count in [&mut *n_light, &mut *n_brdf] {
                 count.expected += 0.5;
                 // All samples of the pixel share a sequence, so each reserves the same number of points.
                 count.reserved += 1;
             }
             // Choose the source of the odd candidate with a number that no direction uses.
             let coin = sample_index.get(Dimension::Environment, m, n_light.reserved).u_lobe();
-            let chosen = if coin < 0.5 { &mut n_light } else { &mut n_brdf };
+            let chosen = if coin < 0.5 { n_light } else { n_brdf };
             chosen.n += 1;
         }
+        samples
+    }
+
+    /// The samples of all points, but for a candidate that the sources do not share evenly.
+    fn even_samples(&self) -> MultiSample<'_> {
+        let (m, n) = self.candidates.split(self.n_candidates);
+        let [n_light, n_brdf] = [Count::fixed(m), Count::fixed(n)];
         let (environment, light) = (self.environment, self.environment.light_density());
         let n_portal = Count::fixed(0);
         MultiSample { environment, light, n_light, n_brdf, n_portal, heuristic: Heuristic::Balance }
     }
 
-    /// Draws the candidates of positive weight into scratch memory.
-    fn draw(
+    /// The samples of all points if they are the same, and so few that those of one point would leave lanes empty.
+    fn few_samples(&self) -> Option<MultiSample<'_>> {
+        let samples = self.even_samples();
+        let (m, n) = (samples.n_light.n, samples.n_brdf.n);
+        let is_even = m + n == self.n_candidates;
+        (is_even && m.max(n) < MOST_LANES as u32).then_some(samples)
+    }
+
+    fn collector<'s>(
         &self,
-        instruction_set: InstructionSet,
-        at: &ShadingPoint,
         sample_index: SampleIndex,
-        scratch: &mut SirScratch,
-    ) {
-        let SirScratch { samples, candidates, reservoirs, .. } = scratch;
-        let (mut generator, n) = (sample_index.generator(), self.n_samples as usize);
-        let streams = self.resampling == Resampling::Reservoir;
-        candidates.clear();
-        reservoirs.clear();
-        let drawn = self.samples(sample_index);
-        drawn.sample_each(instruction_set, at, sample_index, samples, |wi, value, index| {
-            let weight = value.luminance();
-            if weight == 0.0 {
-                return;
-            }
-            let candidate = Candidate { wi, value, weight, index };
-            if streams {
-                reservoirs.add(candidate, f64::from(weight), n, &mut generator);
-            } else {
-                candidates.push(candidate);
-            }
-        });
+        picking: &'s mut PickScratch,
+    ) -> Collector<'s> {
+        picking.candidates.clear();
+        picking.reservoirs.clear();
+        Collector {
+            picking,
+            generator: sample_index.generator(),
+            n: self.n_samples as usize,
+            streams: self.resampling == Resampling::Reservoir,
+        }
     }
 
     fn fill_ticks(&self, sample_index: SampleIndex, ticks: &mut Vec<f32>) {
@@ -187,15 +198,15 @@ impl SamplingImportanceResampling<'_> {
         }
     }
 
-    /// Picks from the candidates in `scratch`.
+    /// Picks from the stored candidates.
     fn pick_stored(
         &self,
         at: &ShadingPoint,
         sample_index: SampleIndex,
-        scratch: &mut SirScratch,
+        picking: &mut PickScratch,
         mut push: impl FnMut(Vec3, Rgb),
     ) {
-        let SirScratch { candidates, order, ticks, .. } = scratch;
+        let PickScratch { candidates, order, ticks, .. } = picking;
         let total = candidates.iter().map(|c| f64::from(c.weight)).sum();
         if !f64::is_finite(total) {
             // Pass overflow on to the film, which counts it.
@@ -218,9 +229,9 @@ impl SamplingImportanceResampling<'_> {
         }
     }
 
-    /// Picks from the candidates in the reservoirs of `scratch`.
-    fn pick_streamed(&self, scratch: &mut SirScratch, mut push: impl FnMut(Vec3, Rgb)) {
-        let SirScratch { candidates: picked, reservoirs, .. } = scratch;
+    /// Picks from the candidates in the reservoirs.
+    fn pick_streamed(&self, picking: &mut PickScratch, mut push: impl FnMut(Vec3, Rgb)) {
+        let PickScratch { candidates: picked, reservoirs, .. } = picking;
         picked.clear();
         picked.extend(reservoirs.items());
         picked.sort_unstable_by_key(|c| c.index);
@@ -228,6 +239,21 @@ impl SamplingImportanceResampling<'_> {
             let (wi, weight) =
                 same[0].picked(same.len(), self.n_samples as usize, reservoirs.total());
             push(wi, weight);
+        }
+    }
+
+    fn pick(
+        &self,
+        at: &ShadingPoint,
+        sample_index: SampleIndex,
+        picking: &mut PickScratch,
+        push: impl FnMut(Vec3, Rgb),
+    ) {
+        match self.resampling {
+            Resampling::Reservoir => self.pick_streamed(picking, push),
+            Resampling::Multinomial | Resampling::Systematic | Resampling::SystematicSorted => {
+                self.pick_stored(at, sample_index, picking, push);
+            }
         }
     }
 
@@ -240,12 +266,36 @@ impl SamplingImportanceResampling<'_> {
         scratch: &mut SirScratch,
         push: impl FnMut(Vec3, Rgb),
     ) {
-        self.draw(instruction_set, at, sample_index, scratch);
-        match self.resampling {
-            Resampling::Reservoir => self.pick_streamed(scratch, push),
-            Resampling::Multinomial | Resampling::Systematic | Resampling::SystematicSorted => {
-                self.pick_stored(at, sample_index, scratch, push);
-            }
+        let SirScratch { samples, picking } = scratch;
+        let mut collector = self.collector(sample_index, picking);
+        let drawn = self.samples(sample_index);
+        drawn.sample_each(instruction_set, at, sample_index, samples, |wi, value, index| {
+            collector.add(wi, value, index);
+        });
+        self.pick(at, sample_index, picking, push);
+    }
+}
+
+/// Collects the candidates of positive weight.
+struct Collector<'a> {
+    picking: &'a mut PickScratch,
+    generator: Pcg32,
+    n: usize,
+    streams: bool,
+}
+
+impl Collector<'_> {
+    fn add(&mut self, wi: Vec3, value: Rgb, index: u32) {
+        let weight = value.luminance();
+        if weight == 0.0 {
+            return;
+        }
+        let candidate = Candidate { wi, value, weight, index };
+        let PickScratch { candidates, reservoirs, .. } = &mut *self.picking;
+        if self.streams {
+            reservoirs.add(candidate, f64::from(weight), self.n, &mut self.generator);
+        } else {
+            candidates.push(candidate);
         }
     }
 }
@@ -304,6 +354,18 @@ impl PointStrategy for SamplingImportanceResampling<'_> {
     }
 
     fn sample_tile(&self, tile: &TileShading, scratch: &mut SirScratch, out: &mut Contributions) {
+        if let Some(few) = self.few_samples() {
+            let SirScratch { samples, picking } = scratch;
+            let portals = Portals::new(&[]);
+            few.each_point(tile, portals, samples, |(i, at, sample_index), drawn| {
+                let mut collector = self.collector(sample_index, picking);
+                for (index, (wi, value)) in (0..).zip(drawn.each()) {
+                    collector.add(wi, value, index);
+                }
+                self.pick(at, sample_index, picking, |wi, weight| out.push(i, wi, weight));
+            });
+            return;
+        }
         for (i, at, sample_index) in tile.each_point() {
             let push = |wi, weight| out.push(i, wi, weight);
             self.sample_with(tile.instruction_set, at, sample_index, scratch, push);

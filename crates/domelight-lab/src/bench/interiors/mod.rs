@@ -168,7 +168,7 @@ impl<'a> InteriorCase<'a> {
             Renderer::with_strategy(scene, camera, self.environment, &strategy, settings);
         renderer.run(&());
         let Rendering { layers, counts, .. } = renderer.rendering();
-        Ok((layers.color.pixels, counts.shadow_rays + renderer.scout_rays()))
+        Ok((layers.color.pixels, counts.shadow_rays + renderer.rays_ahead()))
     }
 
     fn measure(&self, bench: &Bench) -> Result<Vec<Row>, Error> {
@@ -236,32 +236,85 @@ impl<'a> InteriorCase<'a> {
     }
 }
 
-pub(super) fn tables(rows: &[Row]) -> Vec<Table> {
-    let head = [
-        "case",
-        "strategy",
-        "spp",
-        "relMSE",
-        "rays/px",
-        "relMSE × rays",
-        "CPU-s × relMSE",
-        "worst pixel",
-    ];
-    let mut table = Table::new("Interiors", &head);
-    for row in rows {
-        table.rows.push(vec![
-            format!("{} / {} / {}", row.scene, row.probe, row.material),
-            format!("{}{}", row.strategy, row.portals.label()),
-            row.samples.to_string(),
-            number(row.rel_mse),
-            number(row.shadow_rays_per_pixel),
-            number(row.rel_mse * row.shadow_rays_per_pixel),
-            number(row.rel_mse * row.cpu_seconds),
-            format!("{:.0} %", 100.0 * row.largest_pixel),
-        ]);
+/// What an error costs.
+#[derive(Clone, Copy)]
+enum Cost {
+    Rays,
+    Time,
+}
+
+impl Cost {
+    const ALL: [Self; 2] = [Self::Rays, Self::Time];
+
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Rays => "shadow rays of a pixel",
+            Self::Time => "CPU seconds of a picture",
+        }
     }
-    let note = "relMSE: the squared error over R² + (0.1 × the mean luminance)², so that dark rooms count. Worst pixel: \
-                its part of the error, over all seeds.";
+
+    fn times_error(self, row: &Row) -> f64 {
+        let cost = match self {
+            Self::Rays => row.shadow_rays_per_pixel,
+            Self::Time => row.cpu_seconds,
+        };
+        row.rel_mse * cost
+    }
+}
+
+pub(super) fn tables(rows: &[Row]) -> Vec<Table> {
+    let of_samples = |samples| {
+        let rows: Vec<&Row> = rows.iter().filter(|row| row.samples == samples).collect();
+        Cost::ALL.map(|cost| table(&rows, samples, cost))
+    };
+    SAMPLES.into_iter().flat_map(of_samples).collect()
+}
+
+/// relMSE times the cost: a line for each case and the geometric mean of each scene, a column for each strategy.
+fn table(rows: &[&Row], samples: u32, cost: Cost) -> Table {
+    let case = |row: &Row| format!("{} / {} / {}", row.scene, row.probe, row.material);
+    let strategy = |row: &Row| format!("{}{}", row.strategy, row.portals.label());
+    let strategies = distinct(rows.iter().map(|row| strategy(row)));
+    let head: Vec<&str> = std::iter::once("case")
+        .chain(strategies.iter().map(String::as_str))
+        .chain(["largest pixel"])
+        .collect();
+    let mut table =
+        Table::new(format!("relMSE × {}, {samples} camera samples", cost.unit()), &head);
+    let mut line = |name: String, rows: &[&&Row]| {
+        let mean = |column: &String| {
+            let of_column = rows.iter().filter(|row| strategy(row) == *column);
+            let logs: Vec<f64> = of_column.map(|row| cost.times_error(row).ln()).collect();
+            // No rows have a mean of NaN, which is shown as none.
+            number((logs.iter().sum::<f64>() / logs.len() as f64).exp())
+        };
+        let products = rows.iter().filter(|row| row.strategy.starts_with("product"));
+        let largest = products.map(|row| row.largest_pixel).fold(0.0, f64::max);
+        let means = strategies.iter().map(mean);
+        let largest = format!("{:.0} %", 100.0 * largest);
+        table.rows.push([name].into_iter().chain(means).chain([largest]).collect());
+    };
+    for name in distinct(rows.iter().map(|row| case(row))) {
+        let rows: Vec<_> = rows.iter().filter(|row| case(row) == name).collect();
+        line(name, &rows);
+    }
+    for scene in distinct(rows.iter().map(|row| row.scene.clone())) {
+        let rows: Vec<_> = rows.iter().filter(|row| row.scene == scene).collect();
+        line(format!("{scene}, geometric mean"), &rows);
+    }
+    let note = "relMSE: the squared error over R² + (0.1 × the mean luminance)², so that dark rooms count. Largest pixel: \
+                the most of product's error that one pixel has, over all seeds.";
     table.notes.push(note.to_owned());
-    vec![table]
+    table
+}
+
+/// Each text once, in the order of the first.
+fn distinct(texts: impl Iterator<Item = String>) -> Vec<String> {
+    let mut found: Vec<String> = Vec::new();
+    for text in texts {
+        if !found.contains(&text) {
+            found.push(text);
+        }
+    }
+    found
 }

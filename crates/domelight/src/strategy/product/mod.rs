@@ -224,6 +224,10 @@ impl Strategy for ProductSampling<'_> {
         self.n_rays
     }
 
+    fn samples_portals(&self) -> bool {
+        true
+    }
+
     fn samples_per_pass(&self) -> Option<u32> {
         Some((MAX_CANDIDATES / self.n_rays).clamp(1, SAMPLES_PER_PASS))
     }
