@@ -84,6 +84,8 @@ pub(crate) struct RenderReport {
     camera_rays: u64,
     shading_points: u64,
     shadow_rays: u64,
+    /// Those that this run sent ahead of the picture, to find portals and by scouts.
+    rays_ahead: u64,
     rays_per_second: f64,
     peak_memory_bytes: Option<u64>,
     non_finite_samples: u64,
@@ -140,6 +142,7 @@ impl RenderReport {
             camera_rays: counts.camera_rays,
             shading_points: counts.shading_points,
             shadow_rays: counts.shadow_rays,
+            rays_ahead: rendering.rays_ahead,
             peak_memory_bytes: peak_memory(),
             non_finite_samples: counts.non_finite,
             rejection,

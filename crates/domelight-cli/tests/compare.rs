@@ -154,7 +154,8 @@ fn figures_are_those_of_the_film() {
             let alpha = read_bytes(&file, "x.exr", &ReadOptions::default()).unwrap().alpha.unwrap();
             let covered: f64 = alpha.into_iter().map(f64::from).sum();
             samples += number(&report["camera_rays"]) / (48.0 * 40.0) / 2.0;
-            rays += number(&report["shadow_rays"]) / covered / 2.0;
+            rays +=
+                (number(&report["shadow_rays"]) + number(&report["rays_ahead"])) / covered / 2.0;
         }
         let result = &strategy["result"];
         assert_eq!(result["spp"], 6);

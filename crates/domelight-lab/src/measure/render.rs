@@ -29,8 +29,8 @@ impl<S: Strategy> Picturing for S {
         let PreparedSceneRef { scene, camera, environment, .. } = view;
         let mut renderer = Renderer::with_strategy(scene, camera, environment, self, *settings);
         let complete = renderer.run(observer);
-        let Rendering { layers, mut counts, .. } = renderer.rendering();
-        counts.shadow_rays += renderer.rays_ahead();
+        let Rendering { layers, mut counts, rays_ahead, .. } = renderer.rendering();
+        counts.shadow_rays += rays_ahead;
         complete.then_some((layers, counts))
     }
 }

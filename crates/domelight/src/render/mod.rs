@@ -258,6 +258,8 @@ pub struct Rendering {
     pub complete: bool,
     /// The portals that were found, in units of [`Scene::unit`]; see [`portals`].
     pub found_portals: Vec<Portal>,
+    /// The rays sent ahead of the picture; see [`Renderer::rays_ahead`].
+    pub rays_ahead: u64,
 }
 
 /// The data shared by all tiles.

@@ -510,6 +510,12 @@ impl<'a, S: Strategy> Renderer<'a, S> {
             Cow::Borrowed(_) => Vec::new(),
             Cow::Owned(found) => found.clone(),
         };
-        Rendering { layers, counts: self.counts(), complete: self.is_complete(), found_portals }
+        Rendering {
+            layers,
+            counts: self.counts(),
+            complete: self.is_complete(),
+            found_portals,
+            rays_ahead: self.rays_ahead,
+        }
     }
 }

@@ -167,8 +167,8 @@ impl<'a> InteriorCase<'a> {
         let mut renderer =
             Renderer::with_strategy(scene, camera, self.environment, &strategy, settings);
         renderer.run(&());
-        let Rendering { layers, counts, .. } = renderer.rendering();
-        Ok((layers.color.pixels, counts.shadow_rays + renderer.rays_ahead()))
+        let Rendering { layers, counts, rays_ahead, .. } = renderer.rendering();
+        Ok((layers.color.pixels, counts.shadow_rays + rays_ahead))
     }
 
     fn measure(&self, bench: &Bench) -> Result<Vec<Row>, Error> {
