@@ -174,7 +174,7 @@ fn cubes_for_engines_are_turned_back() {
     };
     let read = |name: &str, more: &[&str]| {
         let probe =
-            ["probe", name, "--to", "cube-strip-vertical", "--size", "64", "-q", "-o", "map.pfm"];
+            ["probe", name, "--to", "strip-vertical", "--size", "64", "-q", "-o", "map.pfm"];
         done(&domelight(&folder, &[&probe[..], more].concat()));
         fs::read(folder.path().join("map.pfm")).unwrap()
     };
