@@ -28,28 +28,21 @@ try {
   await page.route("**/*", (route) => route.fulfill({ contentType: "text/html", body: "<title>samples</title>" }));
   await page.goto("https://samples.test/");
   const snippet = await readFile(join(folder, "snippet"), "utf8");
+  const host = await readFile(new URL("host.wgsl", import.meta.url), "utf8");
   const points = (await read("u.bin")).toString("base64");
   for (const name of (await readdir(folder)).filter((name) => name.endsWith(".tables"))) {
     const file = await read(name);
     const [columns, tables] = [file.readUInt32LE(), file.subarray(4).toString("base64")];
-    const samples = await page.evaluate(language === "wgsl" ? wgsl : glsl, { snippet, tables, points, columns });
+    const samples = await page.evaluate(language === "wgsl" ? wgsl : glsl, { snippet, host, tables, points, columns });
     await writeFile(join(folder, name.replace("tables", "samples")), Buffer.from(samples, "base64"));
   }
 } finally {
   await browser.close();
 }
 
-async function wgsl({ snippet, tables, points }) {
+async function wgsl({ snippet, host, tables, points }) {
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const code = `${snippet}
-@group(0) @binding(1) var<storage, read> points: array<vec2<f32>>;
-@group(0) @binding(2) var<storage, read_write> samples: array<vec4<f32>>;
-@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= arrayLength(&points) { return; }
-    let s = domelight_sample(points[id.x]);
-    samples[2u * id.x] = vec4<f32>(s.direction, s.pdf);
-    samples[2u * id.x + 1u] = vec4<f32>(s.radiance, domelight_pdf(s.direction));
-}`;
+  const code = `${snippet}\n${host}`;
   const adapter = await navigator.gpu.requestAdapter();
   const device = await adapter.requestDevice();
   const module = device.createShaderModule({ code });

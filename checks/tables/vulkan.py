@@ -13,16 +13,7 @@ import sys
 import wgpu
 
 # What each host adds to its snippet: the points, the samples, and the loop over them.
-WGSL = """
-@group(0) @binding(1) var<storage, read> points: array<vec2<f32>>;
-@group(0) @binding(2) var<storage, read_write> samples: array<vec4<f32>>;
-@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= arrayLength(&points) { return; }
-    let s = domelight_sample(points[id.x]);
-    samples[2u * id.x] = vec4<f32>(s.direction, s.pdf);
-    samples[2u * id.x + 1u] = vec4<f32>(s.radiance, domelight_pdf(s.direction));
-}
-"""
+WGSL = pathlib.Path(__file__).with_name("host.wgsl").read_text()
 # Vulkan has no uniforms without a binding, and naga no textures that are samplers.
 GLSL_HEAD = """#version 450
 #extension GL_EXT_samplerless_texture_functions : require
@@ -68,7 +59,7 @@ def spir_v(folder, code, *options):
 def compiled(language, folder):
     snippet = (folder / "snippet").read_text()
     if language == "wgsl":
-        return snippet + WGSL
+        return f"{snippet}\n{WGSL}"
     if language == "glsl":
         return spir_v(folder, GLSL_HEAD + snippet + GLSL, "--auto-map-bindings")
     return spir_v(folder, snippet + HLSL, "-D")

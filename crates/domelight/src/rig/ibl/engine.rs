@@ -62,7 +62,7 @@ impl Engine {
         }
     }
 
-    /// The engine whose panoramas have this convention; `None` for programs that take no cubes.
+    /// The engine whose panoramas have this convention; `None` for programs for which no cubes are written.
     pub const fn of_convention(convention: Convention) -> Option<Self> {
         match convention {
             Convention::Three => Some(Self::Three),
