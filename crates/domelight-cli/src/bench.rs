@@ -86,12 +86,12 @@ fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
         meshes, probes, materials, cases, strategies, vs, programs, embree, ..
     } = arguments;
     let given: [(&str, bool, &[Suite]); 8] = [
-        ("--meshes", !meshes.is_empty(), &[Probes]),
+        ("--meshes", !meshes.is_empty(), &[Probes, Interiors]),
         ("--probes", !probes.is_empty(), &[Probes, Interiors, Rigs]),
-        ("--materials", materials.is_some(), &[Probes]),
+        ("--materials", materials.is_some(), &[Probes, Interiors]),
         ("--case", !cases.is_empty(), &[Probes]),
         ("--strategies", !strategies.is_empty(), &[Probes, Lecture]),
-        ("--vs", vs.is_some(), &[Probes]),
+        ("--vs", vs.is_some(), &[Probes, Interiors]),
         ("--program", !programs.is_empty(), &[Felt]),
         ("--embree", embree.is_some(), &[Kernels]),
     ];

@@ -37,15 +37,16 @@ pub(crate) struct BenchArguments {
     #[arg(long, value_enum, default_value_t = Suite::Lecture)]
     pub(crate) suite: Suite,
 
-    /// Meshes and scenes (.ply, .obj, .gltf, .glb, .toml; built-in: statue, spheres, …) [default:
-    /// statue]
+    /// Meshes and scenes (.ply, .obj, .gltf, .glb, .toml; built-in: statue, spheres, …) [default: statue; for interiors,
+    /// room, blinds, corridor, cage]
     #[arg(long, value_name = "SCENE", num_args = 1.., value_delimiter = ',', help_heading = "Inputs")]
     pub(crate) meshes: Vec<String>,
     /// Probes: files, folders of files, or built-in probes [default: sky, studio, cathedral]
     #[arg(long, value_name = "PROBE", num_args = 1.., value_delimiter = ',', help_heading = "Inputs")]
     pub(crate) probes: Vec<String>,
     /// Materials, separated by commas; own is the scene's own [default: diffuse:0.8, ggx:0.2:single,
-    /// ggx:0.05:single, phong:50:0.5:0.5; own for glTF and scene files]
+    /// ggx:0.05:single, phong:50:0.5:0.5; own for glTF and scene files; for interiors, diffuse:0.7, ggx:0.2:single, and
+    /// own of files]
     #[arg(long, value_name = "LIST", help_heading = "Inputs")]
     pub(crate) materials: Option<String>,
     /// Cases of these scenes, probes and materials, each a comma-separated list; may be repeated

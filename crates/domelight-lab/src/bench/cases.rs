@@ -13,6 +13,7 @@ use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{CameraSettings, SceneDescription};
 
 use super::BenchSettings;
+use super::mitsuba::MitsubaScene;
 use crate::job::value::{Count, NotNegative, Rotation, Size, Text, Triple};
 use crate::job::{Light, SceneSettings, Subject, View};
 use crate::scene::{PreparedScene, close_up};
@@ -178,7 +179,7 @@ fn files(probe: &str) -> Result<Vec<String>, Error> {
 }
 
 /// Materials begin with a letter, further numbers of a color do not.
-fn case_materials(list: &str) -> Result<Vec<CaseMaterial>, Error> {
+pub(super) fn case_materials(list: &str) -> Result<Vec<CaseMaterial>, Error> {
     let mut texts: Vec<String> = Vec::new();
     for part in list.split(',') {
         match texts.last_mut() {
@@ -219,6 +220,14 @@ pub(super) fn short(name: &str) -> &str {
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} / {} / {}", short(&self.scene), short(&self.probe), self.material)
+    }
+}
+
+impl BuiltCase {
+    pub(super) fn for_mitsuba(&self) -> MitsubaScene<'_> {
+        let PreparedScene { scene, environment, .. } = &self.view;
+        let size = [self.settings.width, self.settings.height];
+        MitsubaScene { scene, camera: self.camera, environment, size }
     }
 }
 

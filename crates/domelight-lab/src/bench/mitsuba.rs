@@ -11,9 +11,10 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use domelight::bsdf::{Fresnel, Masking, MaterialSpec, Scattering};
+use domelight::environment::Environment;
 use domelight::math::{Mat3, PI, Vec3};
 use domelight::picture::exr::ExrLayers;
-use domelight::scene::Projection;
+use domelight::scene::{CameraSettings, Projection, Scene};
 use domelight::{Rgb, RgbImage};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -31,6 +32,14 @@ const VARIANT: &str = "llvm_ad_rgb";
 const MOST_OF_A_CALL: u32 = 1024;
 /// Seeds of the halves of a reference, which nobody takes for pictures.
 const REFERENCE_SEEDS: [u64; 2] = [0x5eed_0001, 0x5eed_0002];
+
+/// What it is to show.
+pub(super) struct MitsubaScene<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) camera: CameraSettings,
+    pub(super) environment: &'a Environment,
+    pub(super) size: [usize; 2],
+}
 
 /// A Python that waits for work.
 pub(super) struct Mitsuba {
@@ -108,41 +117,41 @@ impl Mitsuba {
         self.setup
     }
 
-    /// Hands a case over; why not, if it cannot show the same.
+    /// Hands a scene over; why not, if it cannot show the same.
     pub(super) fn load(
         &mut self,
-        built: &BuiltCase,
+        shown: &MitsubaScene,
         case_material: &CaseMaterial,
     ) -> Result<Option<String>, Error> {
-        let scene = match self.scene(built, case_material) {
+        let scene = match self.scene(shown, case_material) {
             Ok(scene) => scene,
             Err(why) => return Ok(Some(why)),
         };
         let path = |name| self.folder.path().join(name);
         let mut file = std::io::BufWriter::new(fs::File::create(path(MESH))?);
-        ply::encode(&built.view.scene, &mut file)?;
+        ply::encode(shown.scene, &mut file)?;
         file.flush()?;
-        let map = ExrLayers::from_image(&built.view.environment.radiance_map(), None);
+        let map = ExrLayers::from_image(&shown.environment.radiance_map(), None);
         fs::write(path(MAP), map.encode()?)?;
         let times = self.ask(&json!({ "scene": scene }))?;
         self.setup = seconds(&times);
-        self.size = [built.settings.width, built.settings.height];
+        self.size = shown.size;
         Ok(None)
     }
 
     /// The scene as the script takes it; else why it cannot be said.
-    fn scene(&self, built: &BuiltCase, case_material: &CaseMaterial) -> Result<Value, String> {
+    fn scene(&self, shown: &MitsubaScene, case_material: &CaseMaterial) -> Result<Value, String> {
         let CaseMaterial::Of { material, text } = case_material else {
             return Err("the scene's own materials cannot be passed on".to_owned());
         };
         let bsdf = bsdf(material).ok_or_else(|| format!("it has no {text}"))?;
-        let camera = built.camera;
+        let camera = shown.camera;
         let Projection::Perspective { fov_y_degrees } = camera.projection else {
             return Err("an orthographic camera cannot be passed on".to_owned());
         };
         // Its first column is toward −Z, ours toward +Z.
         let turn = Mat3::from_rotation_y(PI);
-        let rotation = built.view.environment.orientation().map_to_world() * turn;
+        let rotation = shown.environment.orientation().map_to_world() * turn;
         let file = |name| self.folder.path().join(name).display().to_string();
         let array = |v: Vec3| v.to_array();
         Ok(json!({
@@ -154,7 +163,7 @@ impl Mitsuba {
             "origin": array(camera.origin),
             "target": array(camera.target),
             "up": array(camera.up),
-            "size": [built.settings.width, built.settings.height],
+            "size": shown.size,
         }))
     }
 

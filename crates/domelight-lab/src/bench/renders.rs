@@ -160,7 +160,7 @@ impl CaseRunner<'_> {
         let (mut peer_metric, mut peer_left_out) = (None, None);
         if let Some(peer) = &self.peer {
             let mut mitsuba = peer.borrow_mut();
-            peer_left_out = mitsuba.load(&built, &case.material)?;
+            peer_left_out = mitsuba.load(&built.for_mitsuba(), &case.material)?;
             if peer_left_out.is_none() {
                 let goal = goal(MOST_PEER_SAMPLES);
                 let reference = mitsuba.reference(cache, &built, &case.material, goal, host)?;

@@ -5,20 +5,26 @@ mod scenes;
 use domelight::Rgb;
 use domelight::bsdf::Bsdf;
 use domelight::environment::Environment;
+use domelight::math::Vec3;
 use domelight::render::{Background, Filter, RenderSettings, Renderer, Rendering};
-use domelight::scene::{Camera, Scene, SceneDescription};
+use domelight::scene::{Camera, CameraSettings, Scene, SceneDescription};
 use domelight::strategy::{PreparedStrategy, StrategySpec};
 use serde::{Deserialize, Serialize};
 
-use super::Bench;
-use super::cases::{self, short};
+use super::cases::{self, CaseMaterial, short};
+use super::mitsuba::{Mitsuba, MitsubaScene};
 use super::table::{Table, number};
-use crate::usage::Stopwatch;
+use super::{Bench, Peer};
+use crate::job::{FilePart, load_scene};
+use crate::scene::view_of;
+use crate::usage::{Seconds, Stopwatch};
 use crate::{At as _, Error};
 use scenes::Interior;
 
 const SIZE: [usize; 2] = [128, 128];
-const MATERIALS: [&str; 2] = ["diffuse:0.7", "ggx:0.2"];
+const MATERIALS: &str = "diffuse:0.7,ggx:0.2:single";
+/// Those of a file, whose own are measured, too.
+const MATERIALS_OF_FILES: &str = "diffuse:0.7,ggx:0.2:single,own";
 /// Camera samples of the measured pictures.
 const SAMPLES: [u32; 2] = [4, 16];
 /// A reference's strategy, and the camera samples of each of its halves.
@@ -70,7 +76,8 @@ pub(super) struct Row {
     samples: u32,
     /// Mean over the seeds.
     rel_mse: f64,
-    shadow_rays_per_pixel: f64,
+    /// `None` of another program, which does not count them.
+    shadow_rays_per_pixel: Option<f64>,
     /// Of one picture, scouts and preparation included.
     cpu_seconds: f64,
     /// The part of the error in the pixel that has most of it.
@@ -79,18 +86,29 @@ pub(super) struct Row {
 
 pub(super) fn run(bench: &Bench, rows: &mut Vec<Row>) -> Result<(), Error> {
     let environments = cases::environments(bench.settings, &[256], bench.host)?;
-    let n_cases = Interior::ALL.len() * environments.len() * MATERIALS.len();
-    let mut case = 0;
-    for interior in Interior::ALL {
+    let threads = rayon::current_num_threads();
+    let peer = bench.settings.vs.as_ref();
+    let peer = peer.map(|Peer::Mitsuba { python }| Mitsuba::start(python, threads));
+    let mut peer = peer.transpose()?;
+    let builtin = Interior::ALL.map(|interior| interior.name().to_owned());
+    let given = &bench.settings.meshes[..];
+    for scene in if given.is_empty() { &builtin[..] } else { given } {
+        let interior = Interior::from_name(scene);
+        let usual = if interior.is_some() { MATERIALS } else { MATERIALS_OF_FILES };
+        let materials = bench.settings.materials.as_deref().unwrap_or(usual);
+        let description = match interior {
+            Some(interior) => interior.describe(),
+            None => load_scene(scene, &FilePart::default(), false, bench.host)?.0,
+        };
         for (probe, environment) in &environments {
-            for material in MATERIALS {
-                case += 1;
-                let name = format!("{} / {} / {material}", interior.name(), short(probe));
-                bench.host.status(&format!("case {case} of {n_cases}: {name}"));
-                let case = InteriorCase::new(bench, interior, environment, material)?;
-                for measured in case.measure(bench)? {
-                    let probe = short(probe).to_owned();
-                    rows.push(Row { probe, material: material.to_owned(), ..measured });
+            for material in cases::case_materials(materials)? {
+                let [scene, probe] = [scene, probe].map(|name| short(name).to_owned());
+                bench.host.status(&format!("{scene} / {probe} / {material}"));
+                let case = InteriorCase::new(bench, &description, environment, &material);
+                let case = case.at(&scene)?;
+                for measured in case.measure(bench, &material, peer.as_mut())? {
+                    let (scene, probe) = (scene.clone(), probe.clone());
+                    rows.push(Row { scene, probe, material: material.to_string(), ..measured });
                 }
             }
         }
@@ -100,10 +118,11 @@ pub(super) fn run(bench: &Bench, rows: &mut Vec<Row>) -> Result<(), Error> {
 
 /// A scene with and without portals under a probe, and what it looks like.
 struct InteriorCase<'a> {
-    interior: Interior,
     environment: &'a Environment,
-    /// Without portals, and with them if it has any.
-    scenes: Vec<(Scene, Camera)>,
+    view: CameraSettings,
+    camera: Camera,
+    without_portals: Scene,
+    with_portals: Option<Scene>,
     settings: RenderSettings,
     halves: [Vec<Rgb>; 2],
 }
@@ -111,21 +130,19 @@ struct InteriorCase<'a> {
 impl<'a> InteriorCase<'a> {
     fn new(
         bench: &Bench,
-        interior: Interior,
+        description: &SceneDescription,
         environment: &'a Environment,
-        material: &str,
+        material: &CaseMaterial,
     ) -> Result<Self, Error> {
         let [width, height] = bench.settings.size.unwrap_or(SIZE);
-        let bsdf: Bsdf = material.parse().map_err(|e| Error::Usage(format!("{material}: {e}")))?;
-        let with = interior.describe(bsdf);
+        let mut with = description.clone();
+        if let CaseMaterial::Of { material, .. } = *material {
+            with.set_subject_material(Bsdf::from(material));
+            with.remove_scenery();
+        }
+        let view = view_of(&with, width as f32 / height as f32, Vec3::Y);
         let without = SceneDescription { portals: Vec::new(), ..with.clone() };
-        let descriptions =
-            if with.portals.is_empty() { vec![without] } else { vec![without, with] };
-        let scenes = descriptions.into_iter().map(|description| {
-            let scene = Scene::new(description).at(interior.name())?;
-            let camera = Camera::framing(&scene, width, height);
-            Ok((scene, camera))
-        });
+        let with_portals = (!with.portals.is_empty()).then(|| Scene::new(with)).transpose()?;
         let settings = RenderSettings {
             width,
             height,
@@ -134,13 +151,15 @@ impl<'a> InteriorCase<'a> {
             ..RenderSettings::default()
         };
         let mut case = Self {
-            interior,
             environment,
-            scenes: scenes.collect::<Result<_, Error>>()?,
+            view,
+            camera: Camera::new(&view, width, height)?,
+            without_portals: Scene::new(without)?,
+            with_portals,
             settings,
             halves: [Vec::new(), Vec::new()],
         };
-        let best = if case.scenes.len() > 1 { Portals::Named } else { Portals::Found };
+        let best = if case.with_portals.is_some() { Portals::Named } else { Portals::Found };
         for half in 0..2 {
             bench.host.check_canceled()?;
             let seed = REFERENCE_SEED + half as u64;
@@ -157,7 +176,8 @@ impl<'a> InteriorCase<'a> {
         n_samples: u32,
         seed: u64,
     ) -> Result<(Vec<Rgb>, u64), Error> {
-        let (scene, camera) = &self.scenes[usize::from(portals == Portals::Named)];
+        let named = self.with_portals.as_ref().filter(|_| portals == Portals::Named);
+        let (scene, camera) = (named.unwrap_or(&self.without_portals), &self.camera);
         let find_portals = portals == Portals::Found;
         let settings = RenderSettings { n_samples, seed, find_portals, ..self.settings };
         let spec: StrategySpec =
@@ -171,51 +191,77 @@ impl<'a> InteriorCase<'a> {
         Ok((layers.color.pixels, counts.shadow_rays + rays_ahead))
     }
 
-    fn measure(&self, bench: &Bench) -> Result<Vec<Row>, Error> {
+    fn measure(
+        &self,
+        bench: &Bench,
+        material: &CaseMaterial,
+        mut peer: Option<&mut Mitsuba>,
+    ) -> Result<Vec<Row>, Error> {
+        let RenderSettings { width, height, .. } = self.settings;
+        if let Some(mitsuba) = &mut peer {
+            let scene = MitsubaScene {
+                scene: &self.without_portals,
+                camera: self.view,
+                environment: self.environment,
+                size: [width, height],
+            };
+            if mitsuba.load(&scene, material)?.is_some() {
+                peer = None;
+            }
+        }
         let mut rows = Vec::new();
         for samples in SAMPLES {
-            let has_named = self.scenes.len() > 1;
+            let has_named = self.with_portals.is_some();
             for portals in Portals::ALL.into_iter().filter(|&p| has_named || p != Portals::Named) {
                 for strategy in portals.strategies() {
-                    rows.push(self.measure_one(bench, strategy, portals, samples)?);
+                    rows.push(self.measure_one(bench, strategy, portals, samples, |seed| {
+                        let mut watch = Stopwatch::start();
+                        let (picture, n_rays) = self.render(portals, strategy, samples, seed)?;
+                        Ok((picture, Some(n_rays), watch.lap()))
+                    })?);
                 }
+            }
+            if let Some(mitsuba) = &mut peer {
+                rows.push(self.measure_one(bench, MITSUBA, Portals::None, samples, |seed| {
+                    let (picture, time) = mitsuba.render(samples, seed)?;
+                    Ok((picture.image.pixels, None, time))
+                })?);
             }
         }
         Ok(rows)
     }
 
+    /// `render` takes a seed, and gives a picture, its shadow rays and its time.
     fn measure_one(
         &self,
         bench: &Bench,
         strategy: &str,
         portals: Portals,
         samples: u32,
+        mut render: impl FnMut(u64) -> Result<(Vec<Rgb>, Option<u64>, Seconds), Error>,
     ) -> Result<Row, Error> {
         let n_seeds = bench.settings.n_seeds;
         let mut errors = vec![0.0; self.halves[0].len()];
-        let (mut rays, mut cpu_seconds) = (0.0, 0.0);
+        let (mut rays, mut cpu_seconds) = (Some(0), 0.0);
         for seed in 0..u64::from(n_seeds) {
             bench.host.check_canceled()?;
-            let mut watch = Stopwatch::start();
-            let (picture, n_rays) =
-                self.render(portals, strategy, samples, bench.settings.seed + seed)?;
-            let time = watch.lap();
+            let (picture, n_rays, time) = render(bench.settings.seed + seed)?;
             cpu_seconds += time.cpu.unwrap_or(time.wall) / f64::from(n_seeds);
-            rays += n_rays as f64;
+            rays = rays.zip(n_rays).map(|(sum, n)| sum + n);
             self.add_errors(&picture, &mut errors);
         }
-        let n = errors.len() as f64;
+        let n = errors.len() as f64 * f64::from(n_seeds);
         let sum: f64 = errors.iter().sum();
         let largest = errors.iter().copied().fold(0.0, f64::max);
         Ok(Row {
-            scene: self.interior.name().to_owned(),
+            scene: String::new(),
             probe: String::new(),
             material: String::new(),
             strategy: strategy.to_owned(),
             portals,
             samples,
-            rel_mse: sum / n / f64::from(n_seeds),
-            shadow_rays_per_pixel: rays / n / f64::from(n_seeds),
+            rel_mse: sum / n,
+            shadow_rays_per_pixel: rays.map(|rays| rays as f64 / n),
             cpu_seconds,
             largest_pixel: largest / sum,
         })
@@ -236,6 +282,9 @@ impl<'a> InteriorCase<'a> {
     }
 }
 
+/// As a strategy's name.
+const MITSUBA: &str = "Mitsuba, mis:1:1";
+
 /// What an error costs.
 #[derive(Clone, Copy)]
 enum Cost {
@@ -253,12 +302,13 @@ impl Cost {
         }
     }
 
-    fn times_error(self, row: &Row) -> f64 {
+    /// `None` if it is not known.
+    fn times_error(self, row: &Row) -> Option<f64> {
         let cost = match self {
             Self::Rays => row.shadow_rays_per_pixel,
-            Self::Time => row.cpu_seconds,
+            Self::Time => Some(row.cpu_seconds),
         };
-        row.rel_mse * cost
+        cost.map(|cost| row.rel_mse * cost)
     }
 }
 
@@ -274,7 +324,8 @@ pub(super) fn tables(rows: &[Row]) -> Vec<Table> {
 fn table(rows: &[&Row], samples: u32, cost: Cost) -> Table {
     let case = |row: &Row| format!("{} / {} / {}", row.scene, row.probe, row.material);
     let strategy = |row: &Row| format!("{}{}", row.strategy, row.portals.label());
-    let strategies = distinct(rows.iter().map(|row| strategy(row)));
+    let known = rows.iter().filter(|row| cost.times_error(row).is_some());
+    let strategies = distinct(known.map(|row| strategy(row)));
     let head: Vec<&str> = std::iter::once("case")
         .chain(strategies.iter().map(String::as_str))
         .chain(["largest pixel"])
@@ -284,7 +335,8 @@ fn table(rows: &[&Row], samples: u32, cost: Cost) -> Table {
     let mut line = |name: String, rows: &[&&Row]| {
         let mean = |column: &String| {
             let of_column = rows.iter().filter(|row| strategy(row) == *column);
-            let logs: Vec<f64> = of_column.map(|row| cost.times_error(row).ln()).collect();
+            let logs: Vec<f64> =
+                of_column.filter_map(|row| cost.times_error(row)).map(f64::ln).collect();
             // No rows have a mean of NaN, which is shown as none.
             number((logs.iter().sum::<f64>() / logs.len() as f64).exp())
         };

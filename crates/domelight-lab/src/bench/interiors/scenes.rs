@@ -1,6 +1,7 @@
 //! Interiors: scenes that light enters through small openings.
 
-use domelight::bsdf::Bsdf;
+use domelight::Rgb;
+use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::geometry::Mesh;
 use domelight::math::{FRAC_PI_2, Mat4, PI, TAU, Vec2, Vec3, vec2, vec3};
 use domelight::sampling::Pcg32;
@@ -8,7 +9,7 @@ use domelight::scene::builtin::shapes::icosphere;
 use domelight::scene::{CameraSettings, Material, Part, Projection, SceneDescription};
 use domelight::strategy::Portal;
 
-/// A scene of one material.
+/// A scene, all of it diffuse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interior {
     /// 4 × 3 × 5 m with a window of 1 × 1.2 m, and a ball.
@@ -33,8 +34,12 @@ impl Interior {
         }
     }
 
-    /// The scene, of `bsdf`, with its portals.
-    pub(super) fn describe(self, bsdf: Bsdf) -> SceneDescription {
+    pub(super) fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|interior| interior.name() == name)
+    }
+
+    /// The scene, with its portals.
+    pub(super) fn describe(self) -> SceneDescription {
         let mut quads = Quads::default();
         let (mesh, portals, camera) = match self {
             Self::Room => {
@@ -68,9 +73,10 @@ impl Interior {
                 (quads.with_ball(0.7, vec3(0.0, 1.0, 0.0)), Vec::new(), camera)
             }
         };
+        let white = MaterialSpec::Diffuse { albedo: Rgb::splat(0.7) };
         SceneDescription {
             parts: vec![Part { name: self.name().to_owned(), mesh, material: 0 }],
-            materials: vec![Material::fixed(self.name(), bsdf)],
+            materials: vec![Material::fixed(self.name(), Bsdf::from(white))],
             camera: Some(camera),
             portals,
             ..SceneDescription::default()
