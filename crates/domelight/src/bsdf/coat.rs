@@ -65,8 +65,7 @@ impl Coat {
     /// Transforms from the frame of the layer below to the coat's.
     #[inline(always)]
     fn in_coat<F: SimdFloat>(&self, w: Vectors<F>) -> Vectors<F> {
-        let along = |axis: Vec3| w.dot_each(Vectors::splat(w.z, axis));
-        Vectors { x: along(self.frame.x), y: along(self.frame.y), z: along(self.frame.z) }
+        Vectors { x: w.dot(self.frame.x), y: w.dot(self.frame.y), z: w.dot(self.frame.z) }
     }
 }
 

@@ -146,15 +146,16 @@ impl Conductor {
     #[inline(always)]
     fn reflectance_lanes<F: SimdFloat>(&self, cos_theta: F) -> Colors<F> {
         let c = unit(cos_theta);
-        let (eta, k) = (Colors::splat(c, self.eta), Colors::splat(c, self.k));
-        eta.zip(k, |eta, k| conductor(c, eta, k))
+        let Self { eta, k } = *self;
+        Colors([conductor(c, eta.r, k.r), conductor(c, eta.g, k.g), conductor(c, eta.b, k.b)])
     }
 }
 
 /// (R_s + R_p)/2, with a² + b² = |√((η + ik)² − sin² θ)|².
 #[inline(always)]
-fn conductor<F: SimdFloat>(cos: F, eta: F, k: F) -> F {
+fn conductor<F: SimdFloat>(cos: F, eta: f32, k: f32) -> F {
     let one = |x| cos.splat(x);
+    let (eta, k) = (one(eta), one(k));
     let (cos2, eta2, k2) = (cos * cos, eta * eta, k * k);
     let sin2 = one(1.0) - cos2;
     let t = eta2 - k2 - sin2;

@@ -155,7 +155,7 @@ impl MetallicRoughness {
     /// The probability of sampling the specular part: its share of the light that both reflect toward this view, if the
     /// half vectors of the specular part are near the normal. Those of the diffuse part are near no grazing direction, so
     /// it counts whole: over all directions of light, it loses a few percent to (1 − h·wo)⁵ even at a grazing view.
-    #[inline]
+    #[inline(always)]
     pub(super) fn specular_share<F: SimdFloat>(&self, cos_theta_o: F) -> F {
         let one = |x| cos_theta_o.splat(x);
         let grazing = fresnel::schlick_weight(cos_theta_o);

@@ -94,7 +94,10 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn transpose(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
-        let r = rows.map(|row| self.load(row).0);
+        let mut r = [self.load(rows[0]).0; LANES];
+        for (r, row) in r.iter_mut().zip(rows) {
+            *r = self.load(row).0;
+        }
         // SAFETY: `self` proves AVX2.
         unsafe {
             // Pairs of rows, then fours, then all eight.
@@ -196,17 +199,23 @@ impl SimdFloat for F32x8 {
         arguments: [Self; M],
         mut f: impl FnMut([f32; M]) -> [f32; N],
     ) -> [Self; N] {
-        let arguments = arguments.map(Self::store);
+        const { assert!(M > 0) };
+        let mut lanes = [[0.0; LANES]; M];
+        for (lanes, argument) in lanes.iter_mut().zip(arguments) {
+            *lanes = argument.store();
+        }
         let mut values = [[0.0; LANES]; N];
         for lane in 0..LANES {
-            for (value, y) in values.iter_mut().zip(f(arguments.map(|x| x[lane]))) {
+            for (value, y) in values.iter_mut().zip(f(lanes.map(|x| x[lane]))) {
                 value[lane] = y;
             }
         }
-        // SAFETY: the arguments prove AVX2 (M > 0); each value is 8 readable f32, and the load
-        // needs no alignment.
-        const { assert!(M > 0) };
-        values.map(|value| Self(unsafe { _mm256_loadu_ps(value.as_ptr()) }))
+        let mut vectors = [arguments[0]; N];
+        for (vector, value) in vectors.iter_mut().zip(&values) {
+            // SAFETY: the arguments prove AVX2; `value` is 8 readable f32, and the load needs no alignment.
+            *vector = Self(unsafe { _mm256_loadu_ps(value.as_ptr()) });
+        }
+        vectors
     }
 }
 

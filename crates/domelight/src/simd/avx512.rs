@@ -104,7 +104,10 @@ impl Simd for Avx512 {
     }
     #[inline(always)]
     fn transpose(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
-        let r = rows.map(|row| self.load(row).0);
+        let mut r = [self.load(rows[0]).0; LANES];
+        for (r, row) in r.iter_mut().zip(rows) {
+            *r = self.load(row).0;
+        }
         // SAFETY: `self` proves AVX-512.
         unsafe {
             // Pairs of rows, then fours, then all eight.
@@ -242,18 +245,23 @@ macro_rules! real {
                 mut f: impl FnMut([f32; M]) -> [f32; N],
             ) -> [Self; N] {
                 const { assert!(M > 0) };
-                let lanes = arguments.map(Self::to_array);
+                let mut lanes = [arguments[0].to_array(); M];
+                for (lanes, argument) in lanes.iter_mut().zip(arguments) {
+                    *lanes = argument.to_array();
+                }
                 let mut values = [arguments[0].to_array(); N];
                 for lane in 0..values[0].len() {
                     for (value, y) in values.iter_mut().zip(f(lanes.map(|x| x[lane]))) {
                         value[lane] = y;
                     }
                 }
-                values.map(|value| {
+                let mut vectors = [arguments[0]; N];
+                for (vector, value) in vectors.iter_mut().zip(&values) {
                     // SAFETY: the arguments prove AVX-512; `value` has as many readable f32 as a vector, and the load
                     // needs no alignment.
-                    Self(unsafe { $loadu(value.as_ptr()) })
-                })
+                    *vector = Self(unsafe { $loadu(value.as_ptr()) });
+                }
+                vectors
             }
         }
     };

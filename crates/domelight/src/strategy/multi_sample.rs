@@ -241,7 +241,8 @@ impl MultiSample<'_> {
         };
         // Weigh them by the densities of both techniques. Directions below the surface are dark without a ray.
         let (value, pdf_brdf) = at.eval(local);
-        let [n_light, n_brdf] = [self.n_light, self.n_brdf].map(|n| zero.splat(n.expected));
+        let (n_light, n_brdf) =
+            (zero.splat(self.n_light.expected), zero.splat(self.n_brdf.expected));
         let (of_light, of_brdf) = (n_light * self.light.pdf(le), n_brdf * pdf_brdf);
         // A technique without samples has no density, even where that is infinite.
         let of_light = F::select(zero.lt(n_light), of_light, zero);

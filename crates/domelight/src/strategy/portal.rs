@@ -15,6 +15,7 @@ pub struct Portal {
     edges: [Vec3; 2],
     /// A unit vector perpendicular to both edges.
     normal: Vec3,
+    area: f32,
     /// The vectors in the plane whose dot product is 1 with one edge and 0 with the other.
     dual: [Vec3; 2],
 }
@@ -43,7 +44,8 @@ impl Portal {
         let dual = [dual(a, across), dual(b, along)];
         let numbers = [corner, a, b, a + b, dual[0], dual[1]];
         let is_finite = numbers.iter().all(|v| v.is_finite());
-        is_finite.then_some(Self { corner, edges, normal, dual }).ok_or(PortalError)
+        let area = a.cross(b).length();
+        is_finite.then_some(Self { corner, edges, normal, area, dual }).ok_or(PortalError)
     }
 
     /// The image under an affine transform; `None` if it has no area.
@@ -69,7 +71,7 @@ impl Portal {
 
     /// The area.
     pub fn area(&self) -> f32 {
-        self.edges[0].cross(self.edges[1]).length()
+        self.area
     }
 
     /// The vectors in the plane whose dot product is 1 with one edge and 0 with the other: those of a point relative to
@@ -129,7 +131,7 @@ impl<'a> Portals<'a> {
             let cosine = wi.dot(portal.normal);
             let distance = to_corner.dot(portal.normal) / cosine;
             let inside = wi.times(distance).minus(to_corner);
-            let [u, v] = portal.dual.map(|dual| inside.dot(dual));
+            let (u, v) = (inside.dot(portal.dual[0]), inside.dot(portal.dual[1]));
             let is_inside = zero.le(u) & u.le(one) & zero.le(v) & v.le(one) & zero.lt(distance);
             let pdf = distance.squared() / (cosine.abs() * number(self.area));
             sum = sum + F::select(is_inside, pdf, zero);

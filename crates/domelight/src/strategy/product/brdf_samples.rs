@@ -143,8 +143,9 @@ impl BrdfSamples {
 
     #[inline(always)]
     fn to_local<S: Simd>(&self, simd: S, v: Vectors<S::F32x8>) -> Vectors<S::F32x8> {
-        let [x, y, z] = self.frame.each_ref().map(|axis| v.dot_each(Vectors::load(simd, axis)));
-        Vectors { x, y, z }
+        let [x, y, z] = &self.frame;
+        let (x, y, z) = (Vectors::load(simd, x), Vectors::load(simd, y), Vectors::load(simd, z));
+        Vectors { x: v.dot_each(x), y: v.dot_each(y), z: v.dot_each(z) }
     }
 
     #[inline(always)]

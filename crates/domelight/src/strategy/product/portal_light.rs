@@ -10,7 +10,7 @@ use super::control_variate::ControlVariate;
 use super::table::{Table, center};
 use crate::math::Vec3;
 use crate::simd::{LANES, Simd, SimdFloat, Vectors};
-use crate::strategy::portal::Portals;
+use crate::strategy::portal::{Portal, Portals};
 
 /// The row with the slots of portals, beyond those of cells.
 pub(super) const PORTAL_ROW: usize = TABLE_ROWS - 1;
@@ -36,6 +36,37 @@ pub(super) struct StrataShare {
     rms: CellArray,
     /// 1 for cells without a direction through a portal, otherwise 0.
     whole: CellArray,
+    /// Scratch memory of [`StrataShare::fill`].
+    seen: Vec<SeenPortal>,
+}
+
+/// A portal as seen from a point.
+#[derive(Clone, Copy, Debug)]
+struct SeenPortal {
+    normal: Vec3,
+    /// The height of its plane above the point, along the normal.
+    height: f32,
+    axes: [PortalAxis; 2],
+}
+
+/// A coordinate on a portal, from 0 to 1 inside.
+#[derive(Clone, Copy, Debug)]
+struct PortalAxis {
+    /// Its gradient.
+    dual: Vec3,
+    /// The length of the gradient.
+    length: f32,
+    /// The gradient times the vector from the point to the corner.
+    corner: f32,
+}
+
+impl SeenPortal {
+    fn new(portal: &Portal, position: Vec3) -> Self {
+        let (to_corner, normal) = (portal.corner() - position, portal.normal());
+        let axis =
+            |dual: Vec3| PortalAxis { dual, length: dual.length(), corner: dual.dot(to_corner) };
+        Self { normal, height: to_corner.dot(normal), axes: portal.dual().map(axis) }
+    }
 }
 
 impl StrataShare {
@@ -54,22 +85,23 @@ impl StrataShare {
         position: Vec3,
     ) {
         let one = |x| simd.splat_f32x16(x);
+        self.seen.clear();
+        self.seen.extend(portals.iter().map(|portal| SeenPortal::new(portal, position)));
         for pair in cells.pairs() {
             let center = center(simd, cells, pair);
             let angle = cells.bounding_angle.pair(simd, pair).max(one(LEAST_ANGLE));
             let (mut density, mut within, mut whole) = (one(0.0), one(0.0), one(1.0));
-            for portal in portals.iter() {
-                let to_corner = portal.corner() - position;
-                let cosine = center.dot(portal.normal());
+            for portal in &self.seen {
+                let cosine = center.dot(portal.normal);
                 let slant = cosine.abs();
                 // The distance to the plane along the center of the cell, large in directions along the plane.
                 let away = S::F32x16::select(slant.lt(one(PARALLEL)), one(PARALLEL), cosine);
-                let distance = one(to_corner.dot(portal.normal())) / away;
+                let distance = one(portal.height) / away;
                 let reach = angle * distance.abs() / slant.max(one(LEAST_COSINE));
                 let (mut passes, mut inside) = (one(0.0).lt(distance), one(1.0));
-                for dual in portal.dual() {
-                    let at = Vectors::dot(center, dual) * distance - one(dual.dot(to_corner));
-                    let reach = (reach * one(dual.length())).max(one(f32::MIN_POSITIVE));
+                for axis in &portal.axes {
+                    let at = Vectors::dot(center, axis.dual) * distance - one(axis.corner);
+                    let reach = (reach * one(axis.length)).max(one(f32::MIN_POSITIVE));
                     passes = passes & (one(0.0) - reach).le(at) & at.le(one(1.0) + reach);
                     let covered = (at + reach).min(one(1.0)) - (at - reach).max(one(0.0));
                     inside = inside * (covered / (reach + reach)).max(one(0.0)).min(one(1.0));

@@ -214,7 +214,7 @@ impl Table {
             Some(normal) => group.about(normal),
         };
         let half = Vectors::splat(one(0.0), frame.to_world(wo));
-        let [ax2, ay2] = alpha.map(|a| one(sqr(a)));
+        let (ax2, ay2) = (one(sqr(alpha[0])), one(sqr(alpha[1])));
         let rough2 = one(0.5) * (ax2 + ay2);
         let spread2 = one(sqr(group.normal_spread));
         let scale = one(0.25 * FRAC_1_PI * share) / sigma(one(wo.z), rough2);

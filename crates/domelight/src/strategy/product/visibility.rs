@@ -132,9 +132,8 @@ impl VisibilityEstimate {
         let (mut n, mut k) = (simd.splat(0.0), simd.splat(0.0));
         let mut tile = [[[0.0; LANES]; 2]; MAX_ROWS];
         for (row, [n_cells, k_cells]) in cells.rows().zip(&mut tile) {
-            let [scouts_n, scouts_k] = of_scouts.each_ref().map(|c| simd.load(&c[row]));
-            let n_row = sum(simd, rays, row) + scouts_n;
-            let k_row = sum(simd, free, row) + scouts_k;
+            let n_row = sum(simd, rays, row) + simd.load(&of_scouts[0][row]);
+            let k_row = sum(simd, free, row) + simd.load(&of_scouts[1][row]);
             (n, k) = (n + n_row, k + k_row);
             (*n_cells, *k_cells) = (n_row.store(), k_row.store());
         }
