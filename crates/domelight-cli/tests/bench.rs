@@ -117,6 +117,39 @@ fn rigs_keep_the_light() {
 }
 
 #[test]
+fn rooms_are_measured_with_and_without_portals() {
+    let folder = folder();
+    // A floor under a window in the open.
+    let floor = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nf 1 2 3 4\n";
+    fs::write(folder.path().join("floor.obj"), floor).unwrap();
+    let scene = "[camera]\norigin = [0.0, 2.0, 2.0]\ntarget = [0.0, 0.0, 0.0]\n\
+                 [[objects]]\nfile = \"floor.obj\"\nmaterial = \"ggx:0.3\"\n\
+                 [[portals]]\ncorner = [-1.0, 1.0, -1.0]\nedges = [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0]]\n";
+    fs::write(folder.path().join("open.toml"), scene).unwrap();
+    let arguments = ["--meshes", "cage,open.toml", "--size", "8x8", "--probes", "sky"];
+    let quick = ["--seeds", "1", "-q", "--json", "-o", "rooms.json"];
+    let suite = ["bench", "--suite", "interiors"];
+    let results = json(&domelight(&folder, &[&suite[..], &arguments, &quick].concat()));
+    let rows = results["rows"].as_array().unwrap();
+    let of = |scene: &str| rows.iter().filter(|row| row["scene"] == scene).count();
+    // Two numbers of samples, and two materials of three measurements each; its own material, too, and five measurements.
+    assert_eq!((of("cage"), of("open")), (2 * 2 * 3, 2 * 3 * 5));
+    for row in rows {
+        assert!(row["shadow_rays_per_pixel"].as_f64().unwrap() > 0.0, "{row}");
+        assert!(row["cpu_seconds"].as_f64().unwrap() > 0.0, "{row}");
+    }
+    let printed = domelight(&folder, &["bench", "--table", "rooms.json"]);
+    let table = done(&printed);
+    for text in
+        ["| open / sky / own |", "| cage, geometric mean |", "mis:1:1:portals=4, portals named"]
+    {
+        assert!(table.contains(text), "{table}");
+    }
+    let missing = ["--meshes", "no-such.glb", "--size", "8x8"];
+    refused(&domelight(&folder, &[&suite[..], &missing].concat()), 2, &["no-such.glb"]);
+}
+
+#[test]
 fn bad_usage_is_named() {
     let folder = folder();
     let run = |arguments: &[&str]| domelight(&folder, &[&["bench"], arguments].concat());

@@ -29,7 +29,7 @@ const MATERIALS_OF_FILES: &str = "diffuse:0.7,ggx:0.2:single,own";
 const SAMPLES: [u32; 2] = [4, 16];
 /// A reference's strategy, and the camera samples of each of its halves.
 const REFERENCE: &str = "product:8";
-const REFERENCE_SAMPLES: u32 = 1024;
+const REFERENCE_SAMPLES: u32 = 256;
 /// The first seed of a reference, which no measured picture has.
 const REFERENCE_SEED: u64 = 1 << 40;
 
