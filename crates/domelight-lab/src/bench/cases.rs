@@ -13,7 +13,6 @@ use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{CameraSettings, SceneDescription};
 
 use super::BenchSettings;
-use super::mitsuba::MitsubaScene;
 use crate::job::value::{Count, NotNegative, Rotation, Size, Text, Triple};
 use crate::job::{Light, SceneSettings, Subject, View};
 use crate::scene::{PreparedScene, close_up};
@@ -220,14 +219,6 @@ pub(super) fn short(name: &str) -> &str {
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} / {} / {}", short(&self.scene), short(&self.probe), self.material)
-    }
-}
-
-impl BuiltCase {
-    pub(super) fn for_mitsuba(&self) -> MitsubaScene<'_> {
-        let PreparedScene { scene, environment, .. } = &self.view;
-        let size = [self.settings.width, self.settings.height];
-        MitsubaScene { scene, camera: self.camera, environment, size }
     }
 }
 

@@ -22,6 +22,7 @@ use tempfile::TempDir;
 use super::cases::{BuiltCase, CaseMaterial};
 use super::ply;
 use crate::measure::{Cache, Goal, Key, Reference, ReferencePicture};
+use crate::scene::PreparedScene;
 use crate::usage::Seconds;
 use crate::{At as _, Error, Host};
 
@@ -39,6 +40,14 @@ pub(super) struct MitsubaScene<'a> {
     pub(super) camera: CameraSettings,
     pub(super) environment: &'a Environment,
     pub(super) size: [usize; 2],
+}
+
+impl<'a> MitsubaScene<'a> {
+    pub(super) fn of_case(built: &'a BuiltCase) -> Self {
+        let PreparedScene { scene, environment, .. } = &built.view;
+        let size = [built.settings.width, built.settings.height];
+        Self { scene, camera: built.camera, environment, size }
+    }
 }
 
 /// A Python that waits for work.

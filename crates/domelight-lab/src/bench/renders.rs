@@ -10,7 +10,7 @@ use super::bench_run::{
 use super::bound::{Bound, occlusion_rate};
 use super::cases::{self, BuiltCase, Case, short};
 use super::fit::Fit;
-use super::mitsuba::Mitsuba;
+use super::mitsuba::{Mitsuba, MitsubaScene};
 use super::table::{Table, number};
 use super::{Bench, Peer};
 use crate::measure::{Cache, Goal, MIS, Reference, ReferenceReport};
@@ -160,7 +160,7 @@ impl CaseRunner<'_> {
         let (mut peer_metric, mut peer_left_out) = (None, None);
         if let Some(peer) = &self.peer {
             let mut mitsuba = peer.borrow_mut();
-            peer_left_out = mitsuba.load(&built.for_mitsuba(), &case.material)?;
+            peer_left_out = mitsuba.load(&MitsubaScene::of_case(&built), &case.material)?;
             if peer_left_out.is_none() {
                 let goal = goal(MOST_PEER_SAMPLES);
                 let reference = mitsuba.reference(cache, &built, &case.material, goal, host)?;
