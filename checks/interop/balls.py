@@ -5,8 +5,8 @@ orthographic picture. Where an engine looks straight at a ball, a split sum is e
 assumption that the viewer looks along the normal fails, and each engine bends the reflection in its own way.
 """
 
+import base64
 import json
-import pathlib
 import struct
 
 import numpy as np
@@ -18,8 +18,8 @@ N = len(ROUGHNESS) + 1
 SIZE = 128
 RADIUS = 0.9
 
-# What each engine reads, and how a map stands there.
-FILES = {"three": "three/", "babylon": "balls.env", "filament": "balls.ktx"}
+# What each engine reads.
+FILES = {"three": ["three/radiance_00.exr"], "babylon": ["balls.env", "balls.dds"], "filament": ["balls.ktx"]}
 # Limits of the differences from our own render. A split sum is exact in the middle of a metal; engines' dielectrics differ.
 MIDDLE = {"metal": 0.02, "white": 0.04}
 WHOLE = 0.08
@@ -89,8 +89,12 @@ def prepare(domelight, folder):
         write_model(folder / f"ball-{i}.glb", [look])
     probe.write_pfm(folder / "light.pfm", light())
     ours = {}
-    for engine, name in FILES.items():
-        domelight("ibl", folder / "light.pfm", "--for", engine, "-o", f"{folder}/{name}")
+    for engine, files in FILES.items():
+        for name in files:
+            # A picture of a level is one file of a folder.
+            out = f"{folder}/{name.split('/')[0]}" + ("/" if "/" in name else "")
+            texels = ["--texels", "half"] if name.endswith(".dds") else []
+            domelight("ibl", folder / "light.pfm", "--for", engine, *texels, "-o", out)
         ours[engine] = np.concatenate([ball(domelight, folder, i, engine) for i in range(N)], 1)
     return ours
 
@@ -102,6 +106,18 @@ def ball(domelight, folder, i, engine):
     picture = ["--size", f"{SIZE}x{SIZE}", "--spp", 64, "--filter", "box"]
     domelight("render", folder / f"ball-{i}.glb", *light, *picture, "-o", out)
     return probe.read_pfm(out)
+
+
+def shared_exponent(data):
+    """Texels of RGB9E5, from base64."""
+    words = np.frombuffer(base64.b64decode(data), "<u4")
+    mantissas = np.stack([words >> shift & 511 for shift in (0, 9, 18)], -1)
+    return mantissas * 2.0 ** ((words >> 27).astype(int)[:, None] - 24)
+
+
+def half(data):
+    """Texels of RGBA in half precision, from base64."""
+    return np.frombuffer(base64.b64decode(data), "<f2").reshape(-1, 4)[:, :3].astype(float)
 
 
 def read_pixels(path):
