@@ -20,8 +20,8 @@ interface Targets {
 /** What the engine says of prefiltered light. */
 interface Prefiltered {
   levels: number;
-  clipped: number;
-  lost: number;
+  /** What the file changes, as a sentence. */
+  loss: string | null;
   clamped: number;
 }
 
@@ -102,9 +102,9 @@ export class EngineLight {
   private async prefiltered(settings: string, content: string): Promise<Made> {
     const host = await this.app.reference(), notes: string[] = [];
     if (content !== "brdf") {
-      const { clipped, lost, clamped } = JSON.parse(await host.call("prefilter", settings)) as Prefiltered;
+      const { loss, clamped } = JSON.parse(await host.call("prefilter", settings)) as Prefiltered;
       if (clamped > 0) notes.push(`Clamping takes ${percentage(clamped)} of the light.`);
-      if (clipped > 0) notes.push(`${count(clipped)} texels are brighter than the format holds and are clipped: level 0 loses ${percentage(lost)} of its light.`);
+      if (loss) notes.push(`${loss.charAt(0).toUpperCase()}${loss.slice(1)}.`);
     }
     return { bytes: (await host.call("iblFile", settings, content)) as Uint8Array, notes };
   }

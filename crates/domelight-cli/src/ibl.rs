@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result};
 use domelight::environment::Environment;
 use domelight::files::create_folder;
 use domelight::picture::exr::ExrLayers;
-use domelight::picture::texture::{ClippedLight, Container, RadianceFile, Texture};
+use domelight::picture::texture::{Container, EncodingLoss, RadianceFile, Texture};
 use domelight::rig::ibl::{
     BrdfTable, Cube, Engine, IblSettings, PrefilteredLight, SunError, SunTreatment, TableTerms,
     TreatedEnvironment, prefilter,
@@ -34,8 +34,8 @@ pub(crate) fn run(arguments: &IblArguments, quiet: bool) -> Result<()> {
     let (environment, probe) = arguments.load(&settings, quiet)?;
     let treated = arguments.treat_sun(&environment, &probe, quiet)?;
     let light = prefilter(&treated.environment, &settings).with_context(|| probe.clone())?;
-    let clipped = arguments.radiance_file().clipped(&light);
-    arguments.report_clipped(clipped, &probe, quiet)?;
+    let loss = arguments.radiance_file().loss(&light);
+    arguments.report_loss(loss, &probe, quiet)?;
     let sun = treated.sun.as_ref().and_then(|rig| rig.lights.first());
     let description = json_of(&light, &settings, sun);
     results.write(arguments, &light, Engine::terms(engine), &description)?;
@@ -43,7 +43,8 @@ pub(crate) fn run(arguments: &IblArguments, quiet: bool) -> Result<()> {
         let mut report = description;
         report["probe"] = probe.into();
         report["engine"] = engine.map(Engine::name).into();
-        report["clipped"] = json!({ "texels": clipped.texels, "lost": clipped.lost });
+        report["clipped"] = json!({ "texels": loss.texels, "lost": loss.clipped });
+        report["rounded"] = loss.rounded.into();
         let names = results.files.iter().map(|(path, _)| path.to_string_lossy().into_owned());
         report["files"] = names.collect();
         return print_json(&report);
@@ -105,11 +106,11 @@ impl IblArguments {
     }
 
     /// States what the format cannot hold.
-    fn report_clipped(&self, clipped: ClippedLight, probe: &str, quiet: bool) -> Result<()> {
-        let Some(text) = clipped.warning() else { return Ok(()) };
+    fn report_loss(&self, loss: EncodingLoss, probe: &str, quiet: bool) -> Result<()> {
+        let Some(text) = loss.warning() else { return Ok(()) };
         let text = format!("{probe}: {text}");
         if self.light.strict {
-            return Err(UsageError(format!("{text}; without --strict it is clipped")).into());
+            return Err(UsageError(format!("{text}; without --strict this is a warning")).into());
         }
         warn(quiet, &text);
         Ok(())

@@ -6,13 +6,14 @@ use std::fs;
 use std::process::Output;
 use tempfile::TempDir;
 
-/// `sun.exr`, a small sun under a gray sky; `gray.exr`; `black.exr`; `bad.exr` with a texel that is NaN.
+/// `sun.exr`, a small sun under a gray sky; `gray.exr`; `black.exr`; `dim.exr`; `bad.exr` with a texel that is NaN.
 fn probes() -> TempDir {
     let folder = TempDir::new().expect("a temporary folder");
     let gray = RgbImage::filled(64, 32, Rgb::splat(0.5));
     let write = |name: &str, map: &RgbImage| write_exr(&folder.path().join(name), map, None);
     write("gray.exr", &gray);
     write("black.exr", &RgbImage::filled(8, 4, Rgb::BLACK));
+    write("dim.exr", &RgbImage::filled(8, 4, Rgb::splat(1e-9)));
     let mut sun = gray.clone();
     sun.pixels[10 * 64 + 40] = Rgb::new(4e5, 3e5, 2e5);
     write("sun.exr", &sun);
@@ -133,6 +134,28 @@ fn suns_are_clipped_clamped_or_missed_with_a_warning() {
 }
 
 #[test]
+fn light_that_a_format_rounds_away_is_said() {
+    let folder = probes();
+    for (name, change) in [("a.ktx2", "-100.00 %"), ("a.ktx", "-100.00 %"), ("a.env", "-100.00 %")]
+    {
+        let dim = domelight(&folder, &["ibl", "dim.exr", "--size", "4", "-o", name]);
+        let text = warning(&dim);
+        assert!(text.contains("dim.exr") && text.contains(change), "{name}: {}", stderr(&dim));
+    }
+    let scaled = ["ibl", "dim.exr", "--size", "4", "--env-scale", "1e9", "--json", "-o", "a.ktx2"];
+    let scaled = domelight(&folder, &scaled);
+    assert_eq!(stderr(&scaled), "");
+    assert!(json(&scaled)["rounded"].as_f64().unwrap().abs() < 0.002);
+    // RGBE holds all but the smallest numbers of single precision.
+    done(&domelight(&folder, &["probe", "dim.exr", "-q", "-o", "dim.hdr"]));
+    let tiny = RgbImage::filled(8, 4, Rgb::splat(1e-40));
+    write_exr(&folder.path().join("tiny.exr"), &tiny, None);
+    let tiny = domelight(&folder, &["probe", "tiny.exr", "-o", "tiny.hdr"]);
+    assert!(warning(&tiny).contains("32 texels are too dim"), "{}", stderr(&tiny));
+    ended(&domelight(&folder, &["probe", "tiny.exr", "-o", "b.hdr", "--strict"]), 2, &["too dim"]);
+}
+
+#[test]
 fn bad_input_leaves_no_file() {
     let folder = probes();
     let before = fs::read_dir(folder.path()).unwrap().count();
@@ -141,6 +164,8 @@ fn bad_input_leaves_no_file() {
     ended(&run(&["bad.exr", "-o", "a.ktx2", "--strict"]), 2, &["bad.exr", "--strict"]);
     let clipped = ["sun.exr", "--size", "16", "-o", "a.ktx2", "--strict"];
     ended(&run(&clipped), 2, &["brighter than 65408"]);
+    let dim = ["dim.exr", "--size", "16", "-o", "a.dds", "--strict"];
+    ended(&run(&dim), 2, &["dim.exr", "too dim for the format"]);
     ended(&run(&["gray.exr", "-o", "a.png"]), 2, &[".ktx2, .dds, .ktx or .env"]);
     ended(&run(&["gray.exr", "-o", "a.ktx2", "--sun", "dim"]), 2, &["clamp:X"]);
     ended(&run(&["gray.exr", "-o", "a.ktx2", "--for", "quake"]), 2, &["filament"]);

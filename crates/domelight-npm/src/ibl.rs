@@ -117,9 +117,9 @@ impl LightMap {
         let (treated, warning) = treated(self, named("ibl", "sun", &options.sun)?)?;
         let light =
             prefilter(&treated.environment, &settings).map_err(|e| JsError::new(&e.to_string()))?;
-        let (radiance, clipped) = Texture::cube(&light.levels, texels);
+        let (radiance, loss) = Texture::cube(&light.levels, texels);
         let (irradiance, _) = Texture::cube(std::slice::from_ref(&light.irradiance), texels);
-        let clipped = clipped.warning().map(|text| format!("{}: {text}", self.name));
+        let loss = loss.warning().map(|text| format!("{}: {text}", self.name));
         let brdf = Texture::table(&BrdfTable::new(BrdfTable::SIZE, Engine::terms(engine)));
         Ok(Prefiltered {
             radiance: encoded(container, &radiance)?,
@@ -128,7 +128,7 @@ impl LightMap {
             report: to_json(&Report {
                 levels: levels(&light, &settings),
                 harmonics: light.harmonics.coefficients.map(Rgb::to_array),
-                warnings: warning.into_iter().chain(clipped).collect(),
+                warnings: warning.into_iter().chain(loss).collect(),
             }),
         })
     }

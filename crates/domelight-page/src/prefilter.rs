@@ -53,9 +53,8 @@ struct Language {
 #[derive(Serialize)]
 struct IblReport {
     levels: usize,
-    /// Texels above what the format holds, and the share of the light of level 0 that they lose.
-    clipped: usize,
-    lost: f64,
+    /// What the format changes, as a sentence.
+    loss: Option<String>,
     /// The share of the light that was clamped.
     clamped: f64,
 }
@@ -126,11 +125,9 @@ impl Engine {
         let treated = state.treatment()?.apply(self.environment()?).map_err(refused)?;
         let settings = IblSettings::for_engine(state.target()?, state.size);
         let light = prefilter(&treated.environment, &settings).map_err(refused)?;
-        let clipped = state.radiance_file()?.clipped(&light);
         let report = IblReport {
             levels: light.levels.len(),
-            clipped: clipped.texels,
-            lost: clipped.lost,
+            loss: state.radiance_file()?.loss(&light).warning(),
             clamped: treated.clamped,
         };
         let report = to_json(&report);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use domelight::picture::texture::{ClippedLight, Container, RadianceFile, TexelFormat, Texture};
+use domelight::picture::texture::{Container, EncodingLoss, RadianceFile, TexelFormat, Texture};
 use domelight::picture::write_atomically;
 use domelight::rig::ibl::{
     self, BrdfTable, Cube, Engine, IblSettings, SunTreatment, prefilter as prefiltered,
@@ -37,9 +37,9 @@ fn cube<'py>(py: Python<'py>, cube: &Cube) -> PyResult<FloatArray<'py>> {
 }
 
 impl PrefilteredLight {
-    /// A sentence if a file lacks light.
-    fn loss(&self, clipped: ClippedLight) -> Option<String> {
-        clipped.warning().map(|text| format!("{}: {text}", self.name))
+    /// A sentence if a file changes the light.
+    fn loss(&self, loss: EncodingLoss) -> Option<String> {
+        loss.warning().map(|text| format!("{}: {text}", self.name))
     }
 
     /// Writes the radiance, and says what the file lacks.
@@ -54,7 +54,7 @@ impl PrefilteredLight {
             return Err(bad_value(text));
         }
         write_atomically(path, |out| file.encode(&self.inner, out)).map_err(to_python)?;
-        Ok(self.loss(file.clipped(&self.inner)))
+        Ok(self.loss(file.loss(&self.inner)))
     }
 
     /// Writes a texture, and says what it lacks.
@@ -69,9 +69,9 @@ impl PrefilteredLight {
         })?;
         let (texture, loss) = match content {
             "irradiance" => {
-                let (texture, clipped) =
+                let (texture, loss) =
                     Texture::cube(std::slice::from_ref(&self.inner.irradiance), texels);
-                (texture, self.loss(clipped))
+                (texture, self.loss(loss))
             }
             "brdf" => {
                 let table = BrdfTable::new(BrdfTable::SIZE, Engine::terms(self.engine));

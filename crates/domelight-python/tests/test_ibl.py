@@ -96,3 +96,5 @@ def test_bad_requests(env, tmp_path: pathlib.Path):
             light.save(tmp_path / path, content)
     with pytest.warns(dl.DomelightWarning, match="clipped"):
         dl.prefilter(env.scaled(1e4), 4).save(tmp_path / "x.dds")
+    with pytest.warns(dl.DomelightWarning, match="too dim for the format"):
+        dl.prefilter(env.scaled(1e-12), 4).save(tmp_path / "x.dds")

@@ -17,6 +17,7 @@ use domelight::environment::io::{Guess, LoadedProbe, ProbeOptions, SanitizeRepor
 use domelight::environment::mapping::{Mapping, from_lat_long, to_lat_long};
 use domelight::environment::statistics::{ProbeStatistics, Sun};
 use domelight::picture::exposure::Exposure;
+use domelight::picture::hdr;
 use domelight::{Rgb, RgbImage};
 use domelight_lab::job::value::Choice;
 use domelight_lab::probe::{RAYS_A_PIXEL, StrategyNoise, strategy_noise};
@@ -169,6 +170,9 @@ fn convert(
     let tone = arguments.tone.of_picture(|| Exposure::Auto.stops(map, None));
     let mapping = arguments.to;
     let converted = from_lat_long(map, mapping, mapping.size_of([map.width, map.height]));
+    if output.format() == Some(PictureFormat::Hdr) {
+        report_underflow(&converted, output, arguments.strict, quiet)?;
+    }
     output.write(&converted, tone, PictureFormat::Exr, Some(mapping))?;
     // Only OpenEXR states the mapping, and only of some.
     let envmap = match output.format().unwrap_or(PictureFormat::Exr) {
@@ -182,6 +186,27 @@ fn convert(
             "{output}: read it with --mapping {mapping} (of render: --env-mapping); otherwise it is taken for {guess}"
         ));
     }
+    Ok(())
+}
+
+/// States how many texels are too dim for RGBE.
+fn report_underflow(
+    image: &RgbImage,
+    output: &PicturePath,
+    strict: bool,
+    quiet: bool,
+) -> anyhow::Result<()> {
+    let is_lost = |texel: &&Rgb| texel.max_component() > 0.0 && hdr::rgbe(**texel) == [0; 4];
+    let lost = image.pixels.iter().filter(is_lost).count();
+    if lost == 0 {
+        return Ok(());
+    }
+    let text =
+        format!("{output}: {lost} texels are too dim for the format and become black; write .exr");
+    if strict {
+        return Err(UsageError(text).into());
+    }
+    warn(quiet, &text);
     Ok(())
 }
 

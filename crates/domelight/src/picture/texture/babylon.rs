@@ -86,6 +86,13 @@ fn rgbd(texel: Rgb) -> [u8; 4] {
     [byte(texel.r), byte(texel.g), byte(texel.b), divisor as u8]
 }
 
+/// A texel as Babylon's shader decodes it.
+pub(super) fn rounded(texel: Rgb) -> Rgb {
+    let [r, g, b, divisor] = rgbd(texel);
+    let display = |byte: u8| functions::powf(f64::from(byte) / 255.0, 2.2);
+    Rgb::from([r, g, b].map(|byte| (display(byte) * 255.0 / f64::from(divisor)) as f32))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -77,6 +77,21 @@ impl TexelFormat {
             Self::Single => f32::MAX,
         }
     }
+
+    /// A texel without what the format cannot hold: no negative and NaN channels, and at most the largest value.
+    fn clipped(self, texel: Rgb) -> Rgb {
+        texel.map(|c| c.max(0.0).min(self.largest()))
+    }
+
+    /// A texel as readers of the format see it.
+    fn rounded(self, texel: Rgb) -> Rgb {
+        let clipped = self.clipped(texel);
+        match self {
+            Self::SharedExponent => from_shared_exponent(shared_exponent(clipped)),
+            Self::Half | Self::HalfPair => clipped.map(|c| f16::from_f32(c).to_f32()),
+            Self::Single => clipped,
+        }
+    }
 }
 
 read_by_name!(TexelFormat::CUBES, UnknownTexelFormat, "there is no format of texels");
@@ -134,25 +149,27 @@ pub struct Texture {
     pub levels: Vec<Vec<u8>>,
 }
 
-/// Radiance above the largest value of a format.
+/// What a format of texels changes in the light of a cube.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ClippedLight {
+pub struct EncodingLoss {
     /// The number of clipped texels in all levels.
     pub texels: usize,
-    /// The share of the light of level 0 that is lost, in \[0, 1\].
-    pub lost: f64,
+    /// The share of the light of level 0 that clipping loses, in \[0, 1\].
+    pub clipped: f64,
     /// The largest value of a channel in the format.
     pub largest: f32,
+    /// The relative change of the light of level 0 by rounding; −1 if all channels become 0.
+    pub rounded: f64,
 }
 
 impl Texture {
-    /// The levels of a cube, and what was clipped. Negative and NaN channels become 0.
-    pub fn cube(levels: &[Cube], format: TexelFormat) -> (Self, ClippedLight) {
-        let clipped = ClippedLight::of(levels, format.largest());
+    /// The levels of a cube, and what the format changes. Negative and NaN channels become 0.
+    pub fn cube(levels: &[Cube], format: TexelFormat) -> (Self, EncodingLoss) {
+        let loss = EncodingLoss::of(levels, format.largest(), |texel| format.rounded(texel));
         let encode = |cube: &Cube| cube.texels.iter().flat_map(|&t| encode(format, t)).collect();
         let size = [levels.first().map_or(0, |cube| cube.size); 2];
         let levels = levels.iter().map(encode).collect();
-        (Self { size, faces: 6, format, levels }, clipped)
+        (Self { size, faces: 6, format, levels }, loss)
     }
 
     /// A table of the BRDF, as pairs of half precision.
@@ -177,48 +194,62 @@ impl Texture {
     }
 }
 
-impl ClippedLight {
-    /// What a file lacks, as the rest of a sentence about a map; `None` if it lacks nothing.
+impl EncodingLoss {
+    /// Rounding that changes the light by at least this much is worth a warning; formats round it by 0.2 %.
+    const COARSE: f64 = 0.01;
+
+    /// What is wrong with the light of a file, as the rest of a sentence about a map; `None` if nothing is.
     pub fn warning(&self) -> Option<String> {
-        let Self { texels, lost, largest } = *self;
-        (texels > 0).then(|| {
-            format!(
+        let Self { texels, clipped, largest, rounded } = *self;
+        if texels > 0 {
+            return Some(format!(
                 "{texels} texels are brighter than {largest}, the most that the format holds, and are clipped: level 0 \
                  loses {:.2} % of its light; rougher levels are filtered before that",
-                100.0 * lost
+                100.0 * clipped
+            ));
+        }
+        (rounded.abs() >= Self::COARSE).then(|| {
+            format!(
+                "the map is too dim for the format: rounding changes the light of level 0 by {:+.2} %; scale the map up, \
+                 and the light down in the engine",
+                100.0 * rounded
             )
         })
     }
 
-    /// What a format clips whose channels are at most `largest`.
-    fn of(levels: &[Cube], largest: f32) -> Self {
+    /// What a format changes whose channels are at most `largest`, and that rounds texels so.
+    fn of(levels: &[Cube], largest: f32, round: impl Fn(Rgb) -> Rgb) -> Self {
         let is_clipped = |texel: &&Rgb| texel.max_component() > largest;
         let texels = levels.iter().flat_map(|cube| &cube.texels).filter(is_clipped).count();
-        let lost = levels.first().map_or(0.0, |cube| lost_light(cube, largest));
-        Self { texels, lost, largest }
+        let [mut total, mut clipped, mut rounded] = [0.0; 3];
+        let first = levels.iter().take(1).flat_map(|cube| cube.texels.iter().zip(weights(cube)));
+        for (&texel, weight) in first {
+            let channels = texel.to_array().into_iter().zip(round(texel).to_array());
+            for (c, in_file) in channels.map(|pair| (pair.0.max(0.0), pair.1)) {
+                total += weight * f64::from(c);
+                clipped += weight * f64::from((c - largest).max(0.0));
+                rounded += weight * (f64::from(in_file) - f64::from(c.min(largest)));
+            }
+        }
+        let share = |sum: f64| if total > 0.0 { sum / total } else { 0.0 };
+        Self { texels, clipped: share(clipped), largest, rounded: share(rounded) }
     }
 }
 
-/// The share of a cube's light above `largest`.
-fn lost_light(cube: &Cube, largest: f32) -> f64 {
-    let mut sums = [0.0; 2];
-    for (i, texel) in cube.texels.iter().enumerate() {
-        let within = i % (cube.size * cube.size);
-        let along = |i: usize| (2 * i + 1) as f64 / cube.size as f64 - 1.0;
-        let (s, t) = (along(within % cube.size), along(within / cube.size));
+/// The solid angles of a cube's texels, up to a factor.
+fn weights(cube: &Cube) -> impl Iterator<Item = f64> {
+    let size = cube.size;
+    (0..cube.texels.len()).map(move |i| {
+        let along = |i: usize| (2 * i + 1) as f64 / size as f64 - 1.0;
+        let (s, t) = (along(i % size), along(i / size % size));
         let distance2 = 1.0 + s * s + t * t;
-        let weight = 1.0 / (distance2 * distance2.sqrt());
-        for c in texel.to_array() {
-            sums[0] += weight * f64::from((c - largest).max(0.0));
-            sums[1] += weight * f64::from(c);
-        }
-    }
-    if sums[1] > 0.0 { sums[0] / sums[1] } else { 0.0 }
+        1.0 / (distance2 * distance2.sqrt())
+    })
 }
 
 /// The bytes of a texel.
 fn encode(format: TexelFormat, texel: Rgb) -> Vec<u8> {
-    let clipped = texel.map(|c| c.max(0.0).min(format.largest()));
+    let clipped = format.clipped(texel);
     match format {
         TexelFormat::SharedExponent => shared_exponent(clipped).to_le_bytes().to_vec(),
         TexelFormat::Half | TexelFormat::HalfPair => {
@@ -304,12 +335,34 @@ mod tests {
         let mut texels = vec![Rgb::WHITE; 24];
         texels[3] = Rgb::splat(2e5);
         let cube = Cube { size: 2, texels };
-        let (texture, clipped) = Texture::cube(&[cube], TexelFormat::Half);
-        assert_eq!(clipped.texels, 1);
+        let (texture, loss) = Texture::cube(&[cube], TexelFormat::Half);
+        assert_eq!(loss.texels, 1);
         let expected = (2e5 - 65504.0) / (2e5 + 23.0);
-        assert!((clipped.lost - expected).abs() < 1e-9, "{clipped:?}");
+        assert!((loss.clipped - expected).abs() < 1e-9, "{loss:?}");
         assert_eq!(texture.levels[0].len(), 24 * 8);
         assert_eq!(encode(TexelFormat::Half, Rgb::splat(f32::NAN))[..2], [0, 0]);
         assert_eq!(encode(TexelFormat::SharedExponent, Rgb::splat(-1.0)), [0; 4]);
+    }
+
+    #[test]
+    fn dim_light_that_is_rounded_away_is_counted() {
+        let loss = |radiance: f32, format| {
+            let cube = Cube { size: 2, texels: vec![Rgb::splat(radiance); 24] };
+            Texture::cube(&[cube], format).1
+        };
+        for format in TexelFormat::CUBES {
+            for dim in [1e-9, 1e-40] {
+                let lost = loss(dim, format);
+                assert_eq!((lost.texels, lost.rounded), (0, -1.0));
+                assert!(lost.warning().unwrap().contains("-100.00 %"));
+            }
+            assert_eq!(loss(0.0, format).warning(), None);
+            assert_eq!(loss(0.3, format).warning(), None);
+        }
+        // 1.7 steps become 2.
+        let step = functions::powi(2f32, -24);
+        let rounded = loss(1.7 * step, TexelFormat::SharedExponent).rounded;
+        assert!((rounded - 0.3 / 1.7).abs() < 1e-6, "{rounded}");
+        assert_eq!(loss(1e-40, TexelFormat::Single).rounded, 0.0);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{ClippedLight, Container, TexelFormat, Texture, babylon, ktx1};
+use super::{Container, EncodingLoss, TexelFormat, Texture, babylon, ktx1};
 use crate::rig::ibl::{Engine, PrefilteredLight};
 
 /// A file format of prefiltered radiance.
@@ -58,9 +58,13 @@ impl RadianceFile {
         }
     }
 
-    /// What the format clips.
-    pub fn clipped(self, light: &PrefilteredLight) -> ClippedLight {
-        ClippedLight::of(&light.levels, self.largest())
+    /// What the format changes.
+    pub fn loss(self, light: &PrefilteredLight) -> EncodingLoss {
+        EncodingLoss::of(&light.levels, self.largest(), |texel| match self {
+            Self::Texture(_, texels) => texels.rounded(texel),
+            Self::Filament => TexelFormat::Half.rounded(texel),
+            Self::Babylon => babylon::rounded(texel),
+        })
     }
 
     /// Whether the format holds a cube whose faces have `size` columns.
@@ -74,7 +78,7 @@ impl RadianceFile {
         }
     }
 
-    /// Writes the radiance of prefiltered light; [`RadianceFile::clipped`] says what is lost.
+    /// Writes the radiance of prefiltered light; [`RadianceFile::loss`] says what is lost.
     ///
     /// # Errors
     /// If writing to `out` fails.
@@ -93,7 +97,7 @@ impl RadianceFile {
 mod tests {
     use super::*;
     use crate::environment::{Environment, Orientation};
-    use crate::rig::ibl::{IblSettings, prefilter};
+    use crate::rig::ibl::{Cube, IblSettings, prefilter};
     use crate::{Rgb, RgbImage};
 
     /// Light of constant radiance for an engine.
@@ -167,6 +171,20 @@ mod tests {
             // 2 is the brightest channel, so the divisor is 127.
             assert_eq!(texels[3], 127);
         }
+    }
+
+    #[test]
+    fn light_that_a_file_rounds_away_is_counted() {
+        let light = gray(Engine::Babylon, 1);
+        let gray = |radiance: f32| PrefilteredLight {
+            levels: vec![Cube { size: 1, texels: vec![Rgb::splat(radiance); 6] }],
+            ..light.clone()
+        };
+        for file in [RadianceFile::Babylon, RadianceFile::Filament] {
+            assert_eq!(file.loss(&gray(0.5)).warning(), None);
+            assert_eq!(file.loss(&gray(1e-9)).rounded, -1.0);
+        }
+        assert_eq!(RadianceFile::Babylon.loss(&gray(1e3)).texels, 6);
     }
 
     #[test]
