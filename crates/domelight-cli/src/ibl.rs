@@ -28,7 +28,10 @@ use domelight_lab::names::file_name;
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &IblArguments, quiet: bool) -> Result<()> {
     let engine = arguments.target()?;
-    let settings = IblSettings::for_engine(engine, arguments.size as usize);
+    let settings = IblSettings {
+        harmonics_window: !arguments.no_sh_window,
+        ..IblSettings::for_engine(engine, arguments.size as usize)
+    };
     let results = Results::of(arguments, settings.roughness.len());
     results.declare()?;
     let (environment, probe) = arguments.load(&settings, quiet)?;
@@ -250,6 +253,7 @@ fn json_of(light: &PrefilteredLight, settings: &IblSettings, sun: Option<&RigLig
         "levels": levels.map(level).collect::<Vec<_>>(),
         "irradiance_size": light.irradiance.size,
         "harmonics": light.harmonics.coefficients.map(Rgb::to_array),
+        "harmonics_window": light.harmonics_window,
         "axes": settings.axes.world.map(|axis| axis.to_array()),
         "sun": sun.map(|sun| json!({
             "direction": sun.direction.to_array(),

@@ -92,6 +92,23 @@ fn a_folder_of_everything() {
 }
 
 #[test]
+fn harmonics_go_through_a_window_on_demand() {
+    let folder = probes();
+    let with = |probe: &str, more: &[&str]| {
+        let base =
+            ["ibl", probe, "--size", "4", "--sun", "clamp:1e4", "--json", "-q", "-o", "a.ktx"];
+        let report = json(&domelight(&folder, &[&base[..], more].concat()));
+        report["harmonics_window"].as_f64().unwrap()
+    };
+    let mut sun = RgbImage::filled(64, 32, Rgb::splat(1e-3));
+    sun.pixels[10 * 64 + 40] = Rgb::splat(1e4);
+    write_exr(&folder.path().join("night.exr"), &sun, None);
+    assert!((0.86..0.99).contains(&with("night.exr", &[])));
+    assert_eq!(with("night.exr", &["--no-sh-window"]), 1.0);
+    assert_eq!(with("gray.exr", &[]), 1.0);
+}
+
+#[test]
 fn one_file_for_one_engine() {
     let folder = probes();
     let base = ["ibl", "gray.exr", "--size", "16", "--json", "-o"];

@@ -21,6 +21,8 @@ struct IblOptions {
     #[serde(rename = "for")]
     engine: Option<String>,
     sun: String,
+    #[serde(rename = "shWindow")]
+    sh_window: bool,
     texels: String,
     container: String,
 }
@@ -31,6 +33,7 @@ impl Default for IblOptions {
             size: 256,
             engine: None,
             sun: "keep".to_owned(),
+            sh_window: true,
             texels: TexelFormat::SharedExponent.name().to_owned(),
             container: Container::Ktx2.name().to_owned(),
         }
@@ -51,6 +54,8 @@ pub struct Prefiltered {
 struct Report {
     levels: Vec<Level>,
     harmonics: [[f32; 3]; 9],
+    #[serde(rename = "harmonicsWindow")]
+    harmonics_window: f32,
     warnings: Vec<String>,
 }
 
@@ -70,7 +75,8 @@ impl IblOptions {
             let (size, most) = (self.size, IblSettings::MAX_SIZE);
             return Err(JsError::new(&format!("ibl: option size: {size} is not in [1, {most}]")));
         }
-        Ok(IblSettings::for_engine(engine, self.size))
+        let settings = IblSettings::for_engine(engine, self.size);
+        Ok(IblSettings { harmonics_window: self.sh_window, ..settings })
     }
 }
 
@@ -128,6 +134,7 @@ impl LightMap {
             report: to_json(&Report {
                 levels: levels(&light, &settings),
                 harmonics: light.harmonics.coefficients.map(Rgb::to_array),
+                harmonics_window: light.harmonics_window,
                 warnings: warning.into_iter().chain(loss).collect(),
             }),
         })

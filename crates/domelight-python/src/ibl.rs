@@ -124,6 +124,12 @@ impl PrefilteredLight {
         rows(py, coefficients.iter().map(|c| c.to_array()).collect(), &[9])
     }
 
+    /// float: the weight of degrees 1 and 2 in the window that the harmonics went through, in [0, 1]; 1 without a window.
+    #[getter]
+    fn harmonics_window(&self) -> f32 {
+        self.inner.harmonics_window
+    }
+
     /// Rig or None: the sun that was taken out of the map.
     #[getter]
     fn sun(&self) -> Option<Rig> {
@@ -208,6 +214,8 @@ impl PrefilteredLight {
 /// sun : str, default 'keep'
 ///     'keep', 'remove' or 'clamp:X'. A sun that is removed is `PrefilteredLight.sun`, for an engine that lights the scene by
 ///     it. 'clamp:100' scales every texel until its brightest channel is at most 100.
+/// sh_window : bool, default True
+///     Remove the rings of the harmonics by a window where their irradiance would be negative, opposite to small bright lights.
 /// threads : int, optional
 ///     By default the cores available to the process. The light does not depend on it.
 ///
@@ -221,18 +229,20 @@ impl PrefilteredLight {
 /// ValueError
 ///     If the map is black or has no sun to remove, the size is out of range, or the engine is unknown.
 #[pyfunction]
-#[pyo3(signature = (env, size = 256, *, engine = None, sun = "keep", threads = None),
-    text_signature = "(env, size=256, *, engine=None, sun='keep', threads=None)")]
+#[pyo3(signature = (env, size = 256, *, engine = None, sun = "keep", sh_window = true, threads = None),
+    text_signature = "(env, size=256, *, engine=None, sun='keep', sh_window=True, threads=None)")]
 pub(crate) fn prefilter(
     env: &Bound<'_, Environment>,
     size: usize,
     engine: Option<&str>,
     sun: &str,
+    sh_window: bool,
     threads: Option<usize>,
 ) -> PyResult<PrefilteredLight> {
     let engine: Option<Engine> = engine.map(str::parse).transpose().map_err(|e| from_source(&e))?;
     let sun: SunTreatment = sun.parse().map_err(|e| from_source(&e))?;
-    let settings = IblSettings::for_engine(engine, size);
+    let settings =
+        IblSettings { harmonics_window: sh_window, ..IblSettings::for_engine(engine, size) };
     let Environment { inner, name } = env.get();
     let (inner, clamped, sun) = parallel_on(env.py(), threads, || {
         let treated = sun.apply(inner).map_err(|e| from_source(&e))?;

@@ -98,3 +98,11 @@ def test_bad_requests(env, tmp_path: pathlib.Path):
         dl.prefilter(env.scaled(1e4), 4).save(tmp_path / "x.dds")
     with pytest.warns(dl.DomelightWarning, match="too dim for the format"):
         dl.prefilter(env.scaled(1e-12), 4).save(tmp_path / "x.dds")
+
+
+def test_harmonics_do_not_ring():
+    night = np.full((16, 32, 3), 1e-3, np.float32)
+    night[5, 9] = 1e4
+    sky = dl.Environment(night)
+    assert 0.86 < dl.prefilter(sky, 4).harmonics_window < 1
+    assert dl.prefilter(sky, 4, sh_window=False).harmonics_window == 1

@@ -290,6 +290,26 @@ fn harmonics_are_near_the_exact_irradiance() {
     }
 }
 
+/// Opposite to a sun, nine harmonics fall below zero, and their window prevents it.
+#[test]
+fn harmonics_are_not_negative() {
+    let environment = one_texel(32, 16, [9, 4], 1e3);
+    let with = |harmonics_window| {
+        let settings = IblSettings { axes: Engine::Three.axes(), harmonics_window, ..small(16) };
+        prefilter(&environment, &settings).unwrap()
+    };
+    let darkest = |light: &PrefilteredLight| {
+        let cube = &light.irradiance;
+        let irradiance = |i| light.harmonics.irradiance(normal(cube, i, CubeAxes::WORLD)).r;
+        let darkest = (0..cube.texels.len()).map(irradiance).fold(f32::MAX, f32::min);
+        darkest / light.harmonics.irradiance(Vec3::Y).r.abs()
+    };
+    let [rings, windowed] = [false, true].map(with);
+    assert!(darkest(&rings) < -0.01 && rings.harmonics_window == 1.0);
+    assert!(darkest(&windowed) > -1e-6 && windowed.harmonics_window < 1.0);
+    assert_eq!(rings.harmonics.coefficients[0], windowed.harmonics.coefficients[0]);
+}
+
 #[test]
 fn extreme_radiance_keeps_its_scale() {
     let dim = prefilter(&one_texel(32, 16, [9, 4], 1.0), &small(8)).unwrap();

@@ -211,8 +211,8 @@ export async function sh(map: t.LightMap): Promise<Float32Array> {
 export async function ibl(map: t.LightMap, options: t.IblOptions = {}): Promise<t.PrefilteredLight> {
   const { engine, id } = loaded(map).kept;
   const { report, ...files } = await engine.call("ibl", [id, json("ibl", options)]);
-  const { levels, harmonics, warnings } = JSON.parse(report);
-  return { ...files, levels, harmonics: new Float32Array(harmonics.flat()), warnings };
+  const { levels, harmonics, harmonicsWindow, warnings } = JSON.parse(report);
+  return { ...files, levels, harmonics: new Float32Array(harmonics.flat()), harmonicsWindow, warnings };
 }
 
 /**

@@ -143,6 +143,8 @@ export interface IblOptions {
   for?: Engine;
   /** What is done with the sun; `clamp:X` clamps all radiance to X. Default: `"keep"`. */
   sun?: "keep" | "remove" | `clamp:${number}`;
+  /** Whether a window removes the rings of the harmonics where their irradiance would be negative. Default: `true`. */
+  shWindow?: boolean;
   /** The format of texels: 4 bytes up to 65408, or 8 bytes up to 65504. Default: `"rgb9e5"`. */
   texels?: "rgb9e5" | "half";
   /** The kind of file. Default: `"ktx2"`. */
@@ -161,6 +163,8 @@ export interface PrefilteredLight {
   levels: { size: number; roughness: number }[];
   /** The harmonics, as those of `sh`, in the frame in which the cubes are looked up. */
   harmonics: Float32Array;
+  /** The weight of degrees 1 and 2 in the window that the harmonics went through, in [0, 1]; 1 without a window. */
+  harmonicsWindow: number;
   /** What the files do not hold of the light, a sentence each. */
   warnings: string[];
 }

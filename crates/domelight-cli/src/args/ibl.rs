@@ -64,6 +64,10 @@ pub(crate) struct IblArguments {
         help_heading = "Prefiltered light"
     )]
     pub(crate) sun: SunTreatment,
+    /// Keep the spherical harmonics as they are where their irradiance would be negative, opposite to small bright lights. By
+    /// default, a window removes such rings
+    #[arg(long, help_heading = "Prefiltered light")]
+    pub(crate) no_sh_window: bool,
     /// Format of the texels in .ktx2 and .dds [default: rgb9e5]
     #[arg(long, help_heading = "Prefiltered light", value_parser = texels())]
     pub(crate) texels: Option<TexelFormat>,

@@ -34,6 +34,7 @@ mod split;
 pub mod tables;
 mod texels;
 mod variance_minimization;
+mod window;
 
 pub use error::{ShadingError, ShadingReference};
 pub use extraction::{CompactExtraction, Extraction, ExtractionSettings, Method, extract};

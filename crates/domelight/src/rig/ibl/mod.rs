@@ -50,6 +50,9 @@ pub struct IblSettings {
     pub irradiance_size: usize,
     /// How the cube stands in the world.
     pub axes: CubeAxes,
+    /// Whether the harmonics go through a window if their irradiance would be negative in some direction:
+    /// [`SphericalHarmonics::windowed`].
+    pub harmonics_window: bool,
 }
 
 impl IblSettings {
@@ -63,7 +66,8 @@ impl IblSettings {
     pub fn linear(size: usize) -> Self {
         let roughness = engine::linear_roughness(size);
         let irradiance_size = Self::IRRADIANCE_SIZE.min(size);
-        Self { size, roughness, irradiance_size, axes: CubeAxes::WORLD }
+        let axes = CubeAxes::WORLD;
+        Self { size, roughness, irradiance_size, axes, harmonics_window: true }
     }
 
     /// The levels of an engine, in cubes that stand as the engine looks them up; without an engine,
@@ -113,6 +117,8 @@ pub struct PrefilteredLight {
     pub irradiance: Cube,
     /// The radiance's nine coefficients, in the frame in which the cubes are looked up.
     pub harmonics: SphericalHarmonics,
+    /// The weight of degrees 1 and 2 in the window that they went through, in \[0, 1\]; 1 without a window.
+    pub harmonics_window: f32,
 }
 
 /// Roughness below which a level is a mirror.
@@ -130,7 +136,7 @@ pub fn prefilter(
     if environment.power() == 0.0 {
         return Err(IblError::Black);
     }
-    let IblSettings { size, ref roughness, irradiance_size, axes } = *settings;
+    let IblSettings { size, ref roughness, irradiance_size, axes, .. } = *settings;
     let lowest = roughness.iter().copied().filter(|r| *r >= MIRROR).fold(1.0, f32::min);
     // A quarter of the half width 2α of the sharpest lobe.
     let finest = 0.5 * f64::from(lowest * lowest);
@@ -139,11 +145,15 @@ pub fn prefilter(
         let size = (size >> level).max(1);
         if r < MIRROR { filter.mirror(size) } else { filter.cube(size, f64::from(r * r)) }
     });
+    let harmonics = SphericalHarmonics::project(environment);
+    let (harmonics, harmonics_window) =
+        if settings.harmonics_window { harmonics.windowed() } else { (harmonics, 1.0) };
     let to_cube = Mat3::from_cols(axes.world[0], axes.world[1], axes.world[2]).transpose();
     Ok(PrefilteredLight {
         levels: levels.collect(),
         irradiance: filter.cube(irradiance_size, 1.0),
-        harmonics: SphericalHarmonics::project(environment).turned(to_cube),
+        harmonics: harmonics.turned(to_cube),
+        harmonics_window,
     })
 }
 
