@@ -1,4 +1,4 @@
-// The numbers of the lecture's last figures against simulations: what is computed by quadrature is what sampling finds.
+// The numbers of the lecture's one-dimensional figures against simulations and quadrature: both find the same.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -10,7 +10,8 @@ async function part(name) {
   return import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].text).toString("base64")}`);
 }
 
-const { generator } = await part("curves");
+const { Table, generator, integral } = await part("curves");
+const { Combination, Envelope, FixedLights, Resampling, Shadowed } = await part("densities");
 
 /** The mean and the variance of repeats, and their standard errors. */
 function moments(n, draw) {
@@ -24,6 +25,76 @@ function moments(n, draw) {
 function requireNear(value, found, error, what) {
   assert.ok(Math.abs(value - found) < 4 * error + 1e-9, `${what}: ${value}, but sampling finds ${found} ± ${error}`);
 }
+
+test("the combination of two densities has the error that is stated", () => {
+  for (const [width, m, n, beta] of [[0.05, 8, 8, 1], [0.05, 8, 8, 2], [0.005, 1, 15, 1], [0.3, 12, 4, 2]]) {
+    const both = new Combination(width, m, n, beta), name = `width ${width}, ${m} + ${n} samples, power ${beta}`;
+    const random = generator(3), [light, lobe] = [both.light, both.lobe].map((p) => [new Table(p, 4000), p]);
+    const mean = (k, [table, p], weight) => Array.from({ length: k }, () => table.sample(random())).reduce((sum, x) => sum + weight(x) * both.f(x) / p(x), 0) / k;
+    const one = () => 1, estimates = {
+      "light alone": () => mean(16, light, one), "lobe alone": () => mean(16, lobe, one),
+      both: () => mean(m, light, both.weight) + mean(n, lobe, (x) => 1 - both.weight(x)),
+    };
+    for (const [which, estimate] of Object.entries(estimates)) {
+      const found = moments(20000, estimate);
+      requireNear(both.exact, found.mean, found.ofMean, `${name}, ${which}, the mean`);
+      requireNear(both.variances[which], found.variance, found.ofVariance, `${name}, ${which}`);
+    }
+  }
+});
+
+test("densities in shadow have the deviations that are stated", () => {
+  for (const [center, width, edge, sun] of [[0.5, 0.08, 0.6, 0.35], [0.3, 0.2, 0.34, 0.35], [0.7, 0.03, 0.69, 0.2]]) {
+    const shadowed = new Shadowed(center, width, edge, sun), { total, visible } = shadowed;
+    for (const [which, density] of Object.entries(shadowed.densities)) {
+      const table = new Table(density, 4000), random = generator(5), name = `lobe at ${center}, ${which}`;
+      const found = moments(20000, () => shadowed.value(table.sample(random()), density) / total);
+      requireNear(visible, found.mean, found.ofMean, `${name}, the mean`);
+      requireNear(shadowed.deviation(which) ** 2, found.variance, found.ofVariance, name);
+    }
+  }
+});
+
+test("an envelope keeps the share of tries that is stated, in proportion to the target", () => {
+  for (const bound of [0.4, 1, 2.5]) {
+    const envelope = new Envelope(bound), n = 40000, { kept } = envelope.tries(n, 11), { acceptance } = envelope;
+    requireNear(acceptance, kept.length / n, Math.sqrt(acceptance * (1 - acceptance) / n), `envelope × ${bound}`);
+    const capped = (x) => Math.min(envelope.target(x), envelope.height(x)), whole = integral(capped);
+    const below = integral((x) => (x < 0.45 ? capped(x) : 0)) / whole;
+    requireNear(below, kept.filter(([x]) => x < 0.45).length / kept.length, Math.sqrt(below * (1 - below) / kept.length), `envelope × ${bound}, left`);
+    if (bound >= 1) assert.ok(envelope.lost < 1e-9);
+  }
+});
+
+test("resampled directions have the density that quadrature finds, and approach the target", () => {
+  const [center, n] = [0.5, 1000], at = (i) => (i + 0.5) / n;
+  const one = new Resampling(center, 1, 7), q = Array.from({ length: n }, (_, i) => one.proposal(at(i))), w = q.map((_, i) => one.weight(at(i)));
+  // Of two candidates, x is kept beside y with probability w(x) / (w(x) + w(y)).
+  const exact = { 1: q, 2: q.map((p, i) => 2 * p * q.reduce((sum, r, j) => sum + r * w[i] / (w[i] + w[j]), 0) / n) };
+  for (const [m, density] of Object.entries(exact)) {
+    const { bars, picks } = new Resampling(center, Number(m), 7), each = n / Resampling.BINS;
+    bars.forEach(([, bar], i) => {
+      const share = density.slice(i * each, (i + 1) * each).reduce((a, b) => a + b, 0) / n;
+      requireNear(share, bar / Resampling.BINS, Math.sqrt(share * (1 - share) / picks) + 1 / picks, `M = ${m}, bin ${i}`);
+    });
+  }
+  const distances = [0, 2, 4, 6].map((k) => new Resampling(center, 2 ** k, 7).distance);
+  assert.ok(distances.every((d, k) => k === 0 || d < distances[k - 1]), `${distances}`);
+  // With many candidates, only the noise of the counts is left: half the sum of absolute values of normal variables.
+  const many = new Resampling(center, 1024, 7);
+  const variances = many.bars.map(([x]) => { const p = many.target(x) / Resampling.BINS; return p * (1 - p) / many.picks; });
+  const spread = 0.5 * Math.sqrt((1 - 2 / Math.PI) * variances.reduce((a, b) => a + b, 0));
+  requireNear(many.noise, many.distance, spread, "M = 1024");
+});
+
+test("random samples in a row of lights have the binomial error, and fixed lights at most half a light", () => {
+  const edge = 0.4, row = new FixedLights(edge), runs = 200;
+  for (const [n, error] of row.noise([2, 16, 128], runs, 9)) {
+    const variance = edge * (1 - edge) / n, fourth = 3 * variance ** 2 + variance * (1 - 6 * edge * (1 - edge)) / n ** 2;
+    requireNear(variance, error ** 2, Math.sqrt((fourth - variance ** 2) / runs), `${n} samples`);
+  }
+  for (const n of [1, 3, 10, 64]) assert.ok(Math.abs(row.share(n) - edge) <= 0.5 / n + 1e-12);
+});
 
 test("the error of stratified samples is what samples have", async () => {
   const { HalfPlane, Smooth, deviations } = await part("strata");

@@ -37,6 +37,9 @@ fn all_figures_are_written() {
     for n in 1..=14 {
         let picture = load(&folder, &format!("out/figure-{n}.png"));
         assert!(picture.width > 800 && picture.height > 300);
+        let numbers: Value =
+            serde_json::from_str(&text(&out.join(format!("figure-{n}.json")))).unwrap();
+        assert!(numbers.as_array().is_some_and(|rows| !rows.is_empty()), "figure {n}");
         assert!(page.contains(&format!("<section id=\"figure-{n}\">")));
         assert!(page.contains(&format!(
             "domelight figures --only {n} --scene=sphere --env-rows=24 --quick"
@@ -89,7 +92,16 @@ fn some_figures_can_be_made_alone() {
         .map(|f| f.unwrap().file_name().into_string().unwrap())
         .collect();
     names.sort();
-    assert_eq!(names, ["figure-1.png", "figure-2.png", "index.html"]);
+    let expected = [
+        "figure-1.csv",
+        "figure-1.json",
+        "figure-1.png",
+        "figure-2.csv",
+        "figure-2.json",
+        "figure-2.png",
+        "index.html",
+    ];
+    assert_eq!(names, expected);
     let page = text(&out.join("index.html"));
     assert!(page.find("id=\"figure-1\"") < page.find("id=\"figure-2\""));
     assert!(!page.contains("id=\"figure-3\""));
@@ -104,7 +116,8 @@ fn json_names_every_file() {
     let figures = report["figures"].as_array().unwrap();
     let numbers: Vec<_> = figures.iter().map(|figure| figure["number"].clone()).collect();
     assert_eq!(numbers, [1, 3]);
-    assert_eq!(figures[0]["files"], serde_json::json!(["figures/figure-1.png"]));
+    let files = ["png", "csv", "json"].map(|e| format!("figures/figure-1.{e}"));
+    assert_eq!(figures[0]["files"], serde_json::json!(files));
     assert!(figures[1]["seconds"].as_f64().unwrap() > 0.0);
     let pictures = figures[1]["pictures"].as_array().unwrap();
     assert!(pictures.len() > 1);

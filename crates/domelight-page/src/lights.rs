@@ -45,12 +45,15 @@ struct RigReport {
 }
 
 #[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
 struct LightReport {
     name: String,
     /// On the map as the probe has it, not turned.
     uv: [f32; 2],
     irradiance: [f32; 3],
     share: f32,
+    /// Of its region \[sr\].
+    solid_angle: f32,
     /// \[degrees\]
     radius: f32,
     kind: &'static str,
@@ -126,6 +129,7 @@ impl Engine {
                 uv: Mapping::LatLong.uv(to_map * light.direction).to_array(),
                 irradiance: light.irradiance.to_array(),
                 share: light.share,
+                solid_angle: light.solid_angle,
                 radius: light.angular_radius.to_degrees(),
                 kind: light.region.kind(),
             });

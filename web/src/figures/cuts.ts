@@ -12,7 +12,7 @@ import { Pictures } from "./pictures";
 import { Ball, COLUMNS, HEIGHT, SmallMap, WIDTH, canvas, cosine, direction, dot, fromBall, onBall, placeOf } from "./small_map";
 
 type Method = "median-cut" | "variance-minimization" | "variance-minimization:2009";
-interface Light { uv: Point; share: number; irradiance: number[] }
+interface Light { uv: Point; share: number; solidAngle: number; irradiance: number[] }
 interface Rig { lights: Light[]; diffuse: number; glossy: number }
 
 const percent = (x: number) => `${short(100 * x)} %`;
@@ -267,13 +267,12 @@ export const cuts = (method: Method, other: Method) => (stage: Stage) => {
       dot(context, uv, radius, style);
       ball.dot(uv, radius, style);
     }
-    if (isMinimized) spheres.show(films, ["the whole probe", `${NAMES[own()]}: error ${percent(rig.diffuse)}`, `${NAMES[other]}: ${percent(beside.diffuse)}`]);
+    if (isMinimized) spheres.show(films, ["the whole probe", `${NAMES[own()]}: error ${percent(rig.diffuse)}`, `${NAMES[other]}: error ${percent(beside.diffuse)}`]);
     stage.fill(context.canvas as HTMLCanvasElement, map.bar, spheres.element);
     if (at && over) stage.mark(...marksOf(at, over, stage.app.state.rotate));
     const near = aroundBrightest(rig.lights);
-    const place = (i: number) => regions[2 * Math.floor(i / COLUMNS) * WIDTH + 2 * (i % COLUMNS)];
-    const area = chosen < 0 ? 0 : regions.reduce((sum, label, i) => sum + (label === chosen ? Math.sin(Math.PI * (Math.floor(i / WIDTH) + 0.5) / HEIGHT) : 0), 0) * Math.PI / (4 * HEIGHT * HEIGHT);
-    stage.read(chosen < 0 ? null : `${over ? `${map.read(over)}; its` : "The"} region holds ${percent(map.share((i) => place(i) === chosen))} of the light in ${percent(area)} of the directions.`);
+    const region = rig.lights[chosen];
+    stage.read(region ? `${over ? `${map.read(over)}; its` : "The"} region holds ${percent(region.share)} of the light in ${percent(region.solidAngle / (4 * Math.PI))} of the directions.` : null);
     const brightest = near.count > 1 ? `the ${near.count} lights within 2° of the brightest hold` : "the brightest holds";
     stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}; ${brightest} ${percent(near.share)} of its energy. The shading error is ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; with ${NAMES[other]}, ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
     if (isMinimized) stage.answer(answerOf(n, rig, beside, stage.app.envName, NAMES[own()]));

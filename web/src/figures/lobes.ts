@@ -209,7 +209,7 @@ export const ward = (stage: Stage) => {
 };
 
 /** Half vectors at the patch centers: polar angle toward the mirror direction and azimuth [degrees]. */
-const PATCHES: Point[] = [[0, 0], [18, 60], [20, -70], [40, 130], [38, -140]];
+const PATCHES: Point[] = [[0, 0], [18, 60], [20, -70], [40, 115], [38, -140]];
 /** The radius of the plane of incidence. */
 const planeRadius = (x0: number) => Math.min(isPresenting() ? 150 : 240, x0 - 30);
 /** The angular radius of the patches [degrees]. */

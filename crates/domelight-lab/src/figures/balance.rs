@@ -114,7 +114,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("Environment and BRDF samples", vec![over_share]),
         ],
         tables: vec![table],
-        has_data: true,
         pictures: Vec::new(),
     })
 }

@@ -138,7 +138,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         formulas: formulas::convergence(),
         rows: vec![Row::new("", plots), Row::new("", vec![over_time])],
         tables: vec![table, slopes],
-        has_data: true,
         pictures: Vec::new(),
     })
 }

@@ -107,7 +107,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("", vec![acceptance_plot(curves)]),
         ],
         tables: vec![table],
-        has_data: false,
         pictures: Vec::new(),
     })
 }

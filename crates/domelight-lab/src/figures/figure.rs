@@ -25,10 +25,8 @@ pub(crate) struct Figure {
     /// The formulas, as MathML.
     pub(crate) formulas: Vec<String>,
     pub(crate) rows: Vec<Row>,
-    /// The measurements.
+    /// The measurements; the first table is written as CSV and JSON.
     pub(crate) tables: Vec<Table>,
-    /// Whether the first table is written as CSV and JSON.
-    pub(crate) has_data: bool,
     /// Radiance maps, written as OpenEXR and PNG.
     pub(crate) pictures: Vec<Radiance>,
 }
@@ -98,7 +96,7 @@ impl Figure {
     pub(crate) fn files(&self) -> Vec<String> {
         let n = self.number;
         let mut names = vec![format!("figure-{n}.png")];
-        if self.has_data {
+        if !self.tables.is_empty() {
             names.extend([format!("figure-{n}.csv"), format!("figure-{n}.json")]);
         }
         names
@@ -118,7 +116,7 @@ impl Figure {
         let n = self.number;
         let sheet = self.sheet();
         host.write(&folder.join(format!("figure-{n}.png")), &sheet.to_png(f64::from(scale))?)?;
-        if let (true, Some(table)) = (self.has_data, self.tables.first()) {
+        if let Some(table) = self.tables.first() {
             host.write(&folder.join(format!("figure-{n}.csv")), table.csv().as_bytes())?;
             host.write(&folder.join(format!("figure-{n}.json")), table.json()?.as_bytes())?;
         }

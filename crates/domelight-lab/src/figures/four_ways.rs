@@ -75,7 +75,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             "relMSE",
             "relMSE × seconds",
         ])],
-        has_data: true,
         pictures: Vec::new(),
     };
     let mut plots = Vec::new();

@@ -20,9 +20,10 @@ const MATERIAL: &str = "ggx:0.3";
 const VIEWER: f64 = 40.0;
 /// Angular radius of the patches of half vectors [degrees].
 const PATCH: f32 = 6.0;
-/// Half vectors at the patch centers: polar angle and azimuth, 180 toward the viewer [degrees]. Chosen so that the
-/// labels of the reflected patches do not overlap.
-const PATCHES: [(f32, f32); 4] = [(0.0, 0.0), (24.0, 90.0), (24.0, 40.0), (24.0, -75.0)];
+/// Half vectors at the patch centers: polar angle and azimuth, 180 toward the viewer [degrees]. The page's are the same.
+/// Chosen so that the labels of the reflected patches do not overlap.
+const PATCHES: [(f32, f32); 5] =
+    [(0.0, 0.0), (18.0, 60.0), (20.0, -70.0), (40.0, 115.0), (38.0, -140.0)];
 /// Width of the slice around the plane of incidence, and of its bins; no bin straddles the normal [degrees].
 const SLICE: f64 = 12.0;
 const BIN: f64 = 5.0;
@@ -79,7 +80,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("Density of ωi in the plane of incidence", vec![plot]),
         ],
         tables: vec![table],
-        has_data: false,
         pictures: Vec::new(),
     })
 }

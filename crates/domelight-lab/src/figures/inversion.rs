@@ -94,7 +94,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("Samples alone, in their colors", alone),
         ],
         tables: vec![numbers],
-        has_data: false,
         pictures: Vec::new(),
     })
 }

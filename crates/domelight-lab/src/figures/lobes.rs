@@ -63,7 +63,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         formulas: formulas::lobes(),
         rows,
         tables: vec![table],
-        has_data: false,
         pictures: Vec::new(),
     })
 }

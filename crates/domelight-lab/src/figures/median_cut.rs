@@ -102,7 +102,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("A matte sphere", sphere_row),
         ],
         tables: vec![table],
-        has_data: false,
         pictures,
     })
 }

@@ -76,7 +76,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("Their cells", late_cells),
         ],
         tables: vec![table],
-        has_data: false,
         pictures: Vec::new(),
     })
 }

@@ -82,7 +82,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             ),
         ],
         tables: vec![table],
-        has_data: false,
         pictures: Vec::new(),
     })
 }

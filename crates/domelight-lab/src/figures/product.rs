@@ -68,7 +68,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new(&format!("{SAMPLES} samples of each, on the product"), samples),
         ],
         tables: vec![table],
-        has_data: false,
         pictures: vec![
             Radiance { name: "environment".into(), image: light, tone },
             Radiance { name: "product".into(), image: product, tone },

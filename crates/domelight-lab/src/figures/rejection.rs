@@ -115,7 +115,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("Tries until enough are accepted", tries),
         ],
         tables: vec![table],
-        has_data: false,
         pictures: Vec::new(),
     })
 }

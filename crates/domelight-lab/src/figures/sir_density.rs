@@ -82,7 +82,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("", vec![plot(&distances, 100.0 * floor)]),
         ],
         tables: vec![table],
-        has_data: false,
         pictures: Vec::new(),
     })
 }

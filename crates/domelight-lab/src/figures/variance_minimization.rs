@@ -66,7 +66,6 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             Row::new("A matte sphere, lit by 64 lights", sphere),
         ],
         tables: vec![errors(context)?],
-        has_data: false,
         pictures,
     })
 }
