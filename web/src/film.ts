@@ -98,7 +98,12 @@ export class FilmView {
 
   constructor(readonly canvas: HTMLCanvasElement, private gpu = true) {}
 
-  /** Created at the first paint, because a panel may never be shown. */
+  /** Makes the painter before the first paint, while the page waits for pixels. */
+  prepare() {
+    this.painter ??= this.makePainter();
+  }
+
+  /** Not made before it is needed, because a panel may never be shown. */
   private makePainter(): Painter {
     const gl = this.gpu ? this.canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true }) : null;
     this.canvas.dataset.painter = gl ? "webgl2" : "2d";

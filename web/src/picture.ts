@@ -11,7 +11,7 @@ import { onFigureWidth } from "./plot";
 import type { Update } from "./protocol";
 import { MaterialControls } from "./materials";
 import { Reference } from "./reference";
-import { DEFAULT, PROBES, SCENES, addressOf, command, commandWords, fileName, isBuiltinProbe } from "./state";
+import { DEFAULT, PROBES, SCENES, addressOf, command, commandWords, fileName, isBuiltinProbe, type State } from "./state";
 import { CURVES, CURVE_NAMES, type Curve } from "./tone";
 
 type Vec = [number, number, number];
@@ -26,6 +26,8 @@ const turned = (v: number[], axis: number[], angle: number): Vec =>
 
 /** The edge length of the preview while the camera moves [pixels]. */
 const PREVIEW = 128;
+/** The automatic exposure of the default picture, for which most visitors need not wait [stops]. */
+const DEFAULT_EXPOSURE = 0.52;
 /** When a reference starts beside a picture that takes long [ms]. */
 const PATIENCE = 3000;
 /** Renders of a reference while the picture is not done. */
@@ -35,6 +37,9 @@ const SPARE = 1.04;
 /** The distances that zooming reaches [radii of the scene]. */
 const NEAREST = 1e-3, FARTHEST = 1e3;
 
+/** Scene and light; for these, automatic exposures are similar for all views and materials. */
+const lightKey = ({ scene, env, rows, ev, scale }: State, missing: App["missing"]) => JSON.stringify([scene, env, rows, ev, scale, missing]);
+
 export class PicturePanel {
   private view: FilmView;
   private jobs: Job[] = [];
@@ -43,10 +48,12 @@ export class PicturePanel {
   private errors = new ErrorPlot();
   private preview = false;
   private settle = 0;
+  /** Whether the whole picture starts as soon as its preview is done. */
+  private followsAtOnce = false;
   /** Counts the started renders. */
   private turn = 0;
   /** The last automatic exposure, the view that it belongs to, and the light and scene for which it is a good guess. */
-  private automatic = { exposure: 0, view: "", light: "" };
+  private automatic = { exposure: DEFAULT_EXPOSURE, view: "", light: lightKey(DEFAULT, { scene: "", env: "" }) };
   private reference: Reference;
   private materials: MaterialControls;
   private referTimer = 0;
@@ -77,6 +84,7 @@ export class PicturePanel {
     this.wireCamera();
     this.wireDivider();
     this.fillControls();
+    if (this.isShown) this.view.prepare();
     onFigureWidth(() => { if (this.jobs.length) this.report(true); });
   }
 
@@ -100,12 +108,17 @@ export class PicturePanel {
     this.render(what !== "render");
   }
 
+  /** Whether the panel of the state shows the picture. */
+  private get isShown() {
+    return !this.app.embeds && ["picture", "xray"].includes(this.app.state.panel);
+  }
+
   /** Whether the picture waits for a panel that shows it. */
   private postponed = false;
 
   /** Renders the picture. Other panels do not share the computer with a picture that nobody sees. */
   private render(atOnce: boolean) {
-    this.postponed = this.app.embeds || !["picture", "xray"].includes(this.app.state.panel);
+    this.postponed = !this.isShown;
     if (!this.postponed) void this.restart(atOnce);
   }
 
@@ -126,12 +139,15 @@ export class PicturePanel {
     clearTimeout(this.settle);
     // A new scene or light waits for its exposure; a new view starts with the last exposure.
     const turn = ++this.turn;
-    if (this.app.state.exposure === null && this.automatic.light !== this.lightKey) {
-      await this.expose();
+    if (this.app.state.exposure === null) {
+      if (this.automatic.light === this.lightKey) this.showExposure(this.automatic.exposure);
+      else await this.expose();
       if (turn !== this.turn) return;
     }
     const small = atOnce && this.app.state.size > 1.5 * PREVIEW;
     if (small) {
+      // Views that follow may be of a drag, which the whole picture would delay.
+      this.followsAtOnce = !this.view.films[0];
       this.start(true);
       this.settle = setTimeout(() => this.start(false), 150) as unknown as number;
     } else this.start(false);
@@ -184,6 +200,10 @@ export class PicturePanel {
     this.pace();
     if (this.preview) {
       document.documentElement.dataset.preview = String(Math.round(performance.now() - this.times.start));
+      if (job.complete && this.followsAtOnce) {
+        clearTimeout(this.settle);
+        this.start(false);
+      }
       return;
     }
     const { measured } = job;
@@ -330,10 +350,8 @@ export class PicturePanel {
     }
   }
 
-  /** Scene and light; for these, automatic exposures are similar for all views and materials. */
   private get lightKey() {
-    const { scene, env, rows, ev, scale } = this.app.state;
-    return JSON.stringify([scene, env, rows, ev, scale, this.app.missing]);
+    return lightKey(this.app.state, this.app.missing);
   }
 
   private showExposure(exposure: number) {
