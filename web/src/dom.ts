@@ -49,6 +49,12 @@ export const count = (n: number) => {
 };
 /** A percentage with its meaningful digits. */
 export const percentage = (share: number) => (share !== 0 && Math.abs(share) < 5e-4 ? "< 0.1 %" : `${signed(100 * share, 1)} %`);
+/** A value and its standard error, which has one digit; both end at the same decimal place. */
+export function withError(x: number, error: number): string {
+  const digits = error > 0 ? Math.max(-Math.floor(Math.log10(error)), 0) : 7;
+  if (digits > 6) return `${short(x)} ± ${short(Number(error.toPrecision(1)))}`;
+  return `${signed(x, digits)} ± ${error.toFixed(digits)}`;
+}
 /** A signed number with a true minus sign. */
 export const signed = (x: number, digits = 2) => x.toFixed(digits).replace("-", "−");
 

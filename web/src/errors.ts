@@ -1,6 +1,6 @@
 // The plot of the error over shadow rays: measured against a reference, or, as long as there is none, estimated.
 
-import { $, count, short, signed } from "./dom";
+import { $, count, short, signed, withError } from "./dom";
 import type { Job } from "./engines";
 import { explain } from "./glossary";
 import type { Film } from "./film";
@@ -76,7 +76,7 @@ function ofMeasured(points: Measured[]): string {
   const [error, sd] = jackknife((without) => Math.sqrt(Math.max(last.parts.mean(without), 0)));
   const whole = points.filter(({ isWhole }) => isWhole);
   const [k, ofSlope] = jackknife((without) => slope(whole.map(({ rays, parts }) => [rays, Math.sqrt(Math.max(parts.mean(without), 0))])));
-  const fall = isFinite(k) && isFinite(ofSlope) ? `slope ${signed(k)} ± ${short(Number(ofSlope.toPrecision(1)))}` : "a slope needs two passes";
+  const fall = isFinite(k) && isFinite(ofSlope) ? `slope ${withError(k, ofSlope)}` : "a slope needs two passes";
   return `has ${short(error)} ± ${short(Number(sd.toPrecision(2)))}, ${fall}`;
 }
 

@@ -47,6 +47,8 @@ const at = (j: string) => par(sub(i("ω"), row(i("i"), o(","), j)));
 const space = `<mspace width="0.6em"/>`;
 /** A term that cancels against another. */
 const canceled = (...x: string[]) => `<mrow class="canceled">${x.join("")}</mrow>`;
+/** A sign, not a difference, where something stands before it. */
+const minus = '<mo form="prefix">−</mo>';
 const eq = o("="), d = `${thin}<mi mathvariant="normal">d</mi>`;
 const wi = sub(i("ω"), i("i")), wo = sub(i("ω"), i("o")), wh = sub(i("ω"), i("h"));
 const fr = ofKind("lobe", sub(i("f"), i("r"))), cos = (x: string) => ofKind("lobe", thin, i("cos"), of, sub(i("θ"), x));
@@ -82,13 +84,13 @@ export const STEPS: Step[] = [
   {
     title: "Ward’s anisotropic Gaussian",
     text: [
-      "Ward models a rough surface by a Gaussian of the half vector’s slope. Proportionality is enough: constants cancel when the cumulative distribution is normalized. Per solid angle, the density is the Gaussian divided by π αx αy cos³ θh. With one width α, the azimuth is uniform and the polar angle is the arc tangent of α √(−ln u).",
-      "Brushed metal has elongated highlights: one width along the brush and another across it. The azimuth is then sampled first, scaled by the ratio of the widths; the polar angle follows from the width at that azimuth. The arc tangent has values between −90° and 90° only, so the azimuth must be put into the quadrant of 2π u: without that, half of the lobe would never be sampled.",
+      "Ward models a rough surface by a Gaussian of the half vector’s slope. Proportionality is enough: constants cancel when the cumulative distribution is normalized. Per solid angle, the density is the Gaussian divided by π αx αy cos³ θh. With one width α, the azimuth is uniform and the tangent of the polar angle is α √(−ln u).",
+      "Brushed metal has elongated highlights: one width along the brush and another across it. The azimuth is then sampled first, scaled by the ratio of the widths; the polar angle follows from the width at that azimuth. The arc tangent of the azimuth has values between −90° and 90° only, so the azimuth must be put into the quadrant of 2π u: without that, half of the lobe would never be sampled.",
     ],
     formulas: [
-      row(i("p"), par(wh), o("∝"), i("exp"), on, tall(o("−"), frac(row(sup(i("tan"), n(2)), sub(i("θ"), i("h"))), sup(i("α"), n(2))))), row(sub(i("θ"), i("h")), eq, i("arctan"), on, par(i("α"), sqrt(row(o("−"), i("ln"), of, sub(i("u"), n(1)))))), row(sub(i("φ"), i("h")), eq, n(2), i("π"), sub(i("u"), n(2))),
-      row(i("p"), par(wh), o("∝"), i("exp"), on, tall(o("−"), sup(i("tan"), n(2)), sub(i("θ"), i("h")), tall(frac(row(sup(i("cos"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))),
-      row(sub(i("φ"), i("h")), eq, i("arctan"), on, tall(frac(sub(i("α"), i("y")), sub(i("α"), i("x"))), thin, i("tan"), on, par(n(2), i("π"), sub(i("u"), n(2))))), row(sub(i("θ"), i("h")), eq, i("arctan"), of, sqrt(frac(row(o("−"), i("ln"), of, sub(i("u"), n(1))), row(frac(row(sup(i("cos"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))))],
+      row(i("p"), par(wh), o("∝"), i("exp"), on, tall(minus, frac(row(sup(i("tan"), n(2)), of, sub(i("θ"), i("h"))), sup(i("α"), n(2))))), row(i("tan"), of, sub(i("θ"), i("h")), eq, i("α"), sqrt(row(o("−"), i("ln"), of, sub(i("u"), n(1))))), row(sub(i("φ"), i("h")), eq, n(2), i("π"), sub(i("u"), n(2))),
+      row(i("p"), par(wh), o("∝"), i("exp"), on, tall(minus, sup(i("tan"), n(2)), of, sub(i("θ"), i("h")), tall(frac(row(sup(i("cos"), n(2)), of, sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), of, sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2)))))),
+      row(sub(i("φ"), i("h")), eq, i("arctan"), on, tall(frac(sub(i("α"), i("y")), sub(i("α"), i("x"))), thin, i("tan"), on, par(n(2), i("π"), sub(i("u"), n(2))))), row(sup(i("tan"), n(2)), of, sub(i("θ"), i("h")), eq, frac(row(o("−"), i("ln"), of, sub(i("u"), n(1))), row(frac(row(sup(i("cos"), n(2)), of, sub(i("φ"), i("h"))), both(i("α"), i("x"), n(2))), o("+"), frac(row(sup(i("sin"), n(2)), of, sub(i("φ"), i("h"))), both(i("α"), i("y"), n(2))))))],
     question: "Which way does the highlight stretch when α along x grows?",
     answer: "Along x: the half vectors tilt farther that way, and the reflected directions twice as far.",
     sources: ["Ward, Measuring and Modeling Anisotropic Reflection, SIGGRAPH 1992.", "Walter, Notes on the Ward BRDF, Cornell University, 2005."],
@@ -277,7 +279,7 @@ export const STEPS: Step[] = [
     title: "A room with a window",
     text: [
       "Inside a room, the sky is the same as before, but nearly all of it is occluded. Neither light nor reflectance nor their product knows where the window is, so most rays end at a wall, and the few that pass carry all of the light.",
-      "Points on the window are another density: every ray passes. A scene may name its windows as portals; half of the default strategy’s candidates are then points on them. The figure computes a section of a room by quadrature, and renders the built-in scene room, which has such a window and names it.",
+      "Points on the window are another density: every ray passes. A scene may name its windows as portals, and the default strategy finds others with a few rays ahead of the picture; half of its candidates are then points on them. The figure computes a section of a room by quadrature, and renders the built-in scene room, which has such a window and names it.",
     ],
     formulas: [row(i("p"), par(i("ω")), eq, frac(sup(i("r"), n(2)), row(i("A"), thin, i("cos"), of, sub(i("θ"), i("w"))))), row(frac(i("σ"), i("I")), eq, sqrt(row(frac(n(1), sup(i("I"), n(2))), int(""), frac(sup(par(fr, cos(i("i")), Li, V), n(2)), i("p")), d, i("ω"), o("−"), n(1))))],
     question: "Which strategy finds the window best, and how many rays does it need? Drag the point, the window’s edges and the sun.",

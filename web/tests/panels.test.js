@@ -20,11 +20,11 @@ after(close);
 
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
-/** Axe's findings, by rule. */
-async function violations(page) {
+/** Axe's findings, by rule; of some rules only, if they are named. */
+async function violations(page, ...rules) {
   await page.evaluate(axe);
-  return page.evaluate(async () => (await window.axe.run(document, { resultTypes: ["violations"] })).violations.map((v) =>
-    `${v.id}: ${v.nodes.map((n) => n.target).join(" ")}`));
+  return page.evaluate(async (rules) => (await window.axe.run(document, { resultTypes: ["violations"], ...(rules.length ? { runOnly: rules } : {}) })).violations.map((v) =>
+    `${v.id}: ${v.nodes.map((n) => n.target).join(" ")}`), rules);
 }
 
 test("the first picture is small, then it is refined", async () => {
@@ -1105,6 +1105,7 @@ test("a teacher presents: F, PageDown, arrow keys, and labels of 24 px", async (
     const end = await page.evaluate(() => Math.max(...[...document.querySelectorAll("#step .question, #figure > div")].map((part) => part.getBoundingClientRect().bottom)));
     assert.ok(end <= 1080, `step ${step} ends at ${end} px`);
   }
+  assert.deepEqual(await violations(page), []);
   await page.keyboard.press("f");
   await page.waitForSelector("html:not([data-presenting])");
   assert.ok(await page.isVisible("#tabs"));
@@ -1736,5 +1737,28 @@ test("every panel fits 390, 820 and 1440 pixels and has no violations of accessi
       }
     }
   }
+  await done();
+});
+
+test("every step with its answer has no violations of accessibility, light and dark", async () => {
+  const { page, done } = await open(LECTURE), found = [];
+  for (let step = 1; step <= 18; step++) {
+    await showStep(page, step);
+    await page.evaluate(() => document.querySelectorAll("#step details").forEach((details) => { details.open = true; }));
+    // Themes differ in their colors alone.
+    for (const [colorScheme, ...rules] of [["light"], ["dark", "color-contrast"]]) {
+      await page.emulateMedia({ colorScheme });
+      found.push(...(await violations(page, ...rules)).map((violation) => `step ${step}, ${colorScheme}: ${violation}`));
+    }
+  }
+  assert.deepEqual(found, []);
+  await done();
+});
+
+test("the default picture begins with its own exposure, without waiting for it", async () => {
+  const { page, done } = await open("", { ready: "html[data-preview]" });
+  const begun = await page.evaluate(() => window.domelight.picture.view.look.exposure);
+  await page.waitForFunction(() => window.domelight.picture.automatic.view);
+  assert.equal(begun, Number((await page.evaluate(() => window.domelight.picture.automatic.exposure)).toFixed(2)));
   await done();
 });

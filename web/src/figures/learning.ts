@@ -13,7 +13,7 @@ export const learning = (stage: Stage) => {
   const shown = stage.player("Shown up to", 0, STAGES.length - 1, STAGES.length - 1, (k) => STAGES[k]);
   const rays = stage.slider("Rays", 1, 8, 0.5, 3);
   const edge = stage.slider("Shadow’s edge", 0.1, 0.9, 0.005, 0.45);
-  const penumbra = stage.slider("Penumbra", 0.01, 0.4, 0.01, 0.15, (x) => `width ${x}`);
+  const penumbra = stage.slider("Penumbra", 0.01, 0.4, 0.01, 0.15);
   const pointed = stage.pointer(({ x }) => edge.set(clamp(x, 0.1, 0.9)));
   stage.draw(() => {
     const pixel = new Pixel(edge(), penumbra()), blind = new Pixel(edge(), penumbra(), false), upTo = shown(), most = top(unoccluded);

@@ -38,18 +38,25 @@ function section(plan: Plan, rays: (number | null)[], under: number | null): str
   const walls = `M${X(0)} ${Y(plan.low)}V${Y(0)}H${X(w)}V${Y(height)}H${X(0)}V${Y(plan.high)}`;
   const sunAt = plan.end(plan.sun), frame = framed({ left, right: left + scale * w, top, bottom, xs: [0, w], ys: [0, height] });
   const text = (x: number, y: number, of: string, anchor = "end") => `<text class="name halo" x="${X(x)}" y="${Y(y)}" text-anchor="${anchor}">${of}</text>`;
+  /** Outside the room, where no rays are. */
+  const nameSun = () => {
+    const [x, y] = sunAt;
+    if (x < 0) return text(x, y + 0.2, "sun", "middle");
+    if (y >= height) return text(x + 0.14, height + 0.05, "sun", "start");
+    return x > 0 ? text(x + 0.14, y - 0.05, "sun", "start") : text(x - 0.14, y - 0.05, "sun");
+  };
   return `<svg viewBox="0 0 ${width} ${end.toFixed(0)}"${frame} aria-hidden="true"><rect x="${X(0)}" y="${Y(height)}" width="${scale * w}" height="${scale * height}" fill="transparent"/>${all.join("")}${under === null ? "" : line(under, "estimate")}
     <path d="${walls}" class="axis" style="stroke-width: 2.5px"/><path class="light line" style="stroke-width: 4px" d="M${X(0)} ${Y(plan.low)}V${Y(plan.high)}"/>
-    <circle class="estimate fill" cx="${X(plan.x)}" cy="${Y(0)}" r="6"/><circle class="light fill" cx="${X(sunAt[0])}" cy="${Y(sunAt[1])}" r="8"/>${text(sunAt[0] + (sunAt[0] > ROOM.width / 2 ? -0.18 : 0.18), Math.max(sunAt[1] - 0.3, 0.1), "sun", sunAt[0] > ROOM.width / 2 ? "end" : "start")}${text(-0.1, (plan.low + plan.high) / 2, "window")}</svg>`;
+    <circle class="estimate fill" cx="${X(plan.x)}" cy="${Y(0)}" r="6"/><circle class="light fill" cx="${X(sunAt[0])}" cy="${Y(sunAt[1])}" r="8"/>${nameSun()}${text(-0.1, plan.low - 0.2, "window")}</svg>`;
 }
 
 export const roomWithWindow = (stage: Stage) => {
   const rays = stage.player("Rays", 1, 64, 32);
   const way = stage.choice("Rays by", ALL.map((name) => [name, WAYS[name]]));
-  const place = stage.slider("Point", 0.3, ROOM.width - 0.3, 0.05, 2.5, (x) => `${x} m from the wall`);
+  const place = stage.slider("Point", 0.3, ROOM.width - 0.3, 0.05, 2.5, (x) => `at ${x} m`);
   const low = stage.slider("Sill", 0.3, 2.4, 0.05, 1, (x) => `${x} m`);
-  const size = stage.slider("Window", 0.1, 2, 0.05, 1, (x) => `${x} m high`);
-  const sun = stage.slider("Sun", -89, 89, 1, 30, (x) => `${Math.abs(x)}° ${x < 0 ? "toward the window" : "away from it"}`);
+  const size = stage.slider("Window", 0.1, 2, 0.05, 1, (x) => `${x} m`);
+  const sun = stage.slider("Sun", -89, 89, 1, 30, (x) => `${Math.abs(x)}° ${x < 0 ? "left" : "right"}`);
   const show = stage.choice("Show", [["section", "a section of a room"], ["scene", "the scene room, rendered"]]);
   let pictures: Pictures | null = null;
   const ends = () => [low(), Math.min(low() + size(), ROOM.height - 0.05)];
@@ -79,7 +86,7 @@ export const roomWithWindow = (stage: Stage) => {
     const [a, b] = ends(), plan = new Plan(place(), a, b, sun() * Math.PI / 180), random = generator(3), sample = plan.sampler(way() as Way);
     const drawn = Array.from({ length: rays() }, () => sample(random())), over = pointed(), under = over?.frame === 0 ? Math.atan2(over.x - plan.x, Math.max(over.y, 1e-3)) : null;
     const found = ALL.map((name) => ({ name, deviation: plan.deviation(name), share: plan.share(name) }));
-    const needed = (deviation: number) => Math.max(1, Math.ceil((deviation / WANTED) ** 2));
+    const needed = (deviation: number) => Math.max(1, Number(((deviation / WANTED) ** 2).toPrecision(3)));
     const bars = plot([{ name: "", kind: "estimate", as: "bars", points: found.map(({ deviation }, i) => [i, deviation]) }],
       { x: { name: "", range: [-0.6, ALL.length - 0.4], ticks: ALL.map((_, i) => i), tick: (i) => (figureWidth() < 480 && i === 4 ? "window" : WAYS[ALL[i]]) }, y: { name: "relative standard deviation of one ray", range: [0, Math.max(1, ...found.map(({ deviation }) => deviation)) * 1.05] }, height: 170, presented: 220 });
     stage.svg(section(plan, drawn, under) + bars, "A room with a window: rays from a point on its floor, and the deviation of each strategy");

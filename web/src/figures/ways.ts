@@ -1,6 +1,6 @@
 // Step 12: four ways to sample the direct illumination of a sphere, measured with repeats.
 
-import { h, short } from "../dom";
+import { h, short, withError } from "../dom";
 import { FilmView, luminance } from "../film";
 import { pixels } from "../pointer";
 import type { Stage } from "../stage";
@@ -32,7 +32,7 @@ function mean(runs: Run[], of: (run: Run) => number): [number, number] {
   return [m, runs.length > 1 ? Math.sqrt(squares / (runs.length - 1) / runs.length) : NaN];
 }
 
-const withError = ([m, sd]: [number, number], digits = 2) => `${short(Number(m.toPrecision(digits)))}${isFinite(sd) ? ` ± ${short(Number(sd.toPrecision(1)))}` : ""}`;
+const shown = ([m, sd]: [number, number]) => (isFinite(sd) ? withError(m, sd) : short(Number(m.toPrecision(2))));
 
 export const fourWays = (stage: Stage) => {
   const by = stage.choice("Compare", [["counts", "at the counts above"], ["time", "at equal time"]]);
@@ -58,7 +58,7 @@ export const fourWays = (stage: Stage) => {
       view.show(0, runs.at(-1)!.film);
       view.show(1, border < 1 ? truth[0].film : null);
       view.set({ divider: border });
-      caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${withError(mean(runs, (run) => run.error))}`, h("br"), `${withError(mean(runs, (run) => run.time / 1000))} s`);
+      caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${shown(mean(runs, (run) => run.error))}`, h("br"), `${shown(mean(runs, (run) => run.time / 1000))} s`);
     });
     const rays = WAYS.map(({ name }, i) => `${name} ${short(Number((mean(all[i], (run) => run.rays)[0] / 1000).toPrecision(3)))} thousand`);
     stage.say(`Errors are mean relative squared errors of the pixels, and times are the engine’s alone. Both are means of ${n === wanted ? n : `${n} of ${wanted}`} repeat${n > 1 ? "s with their standard errors" : ", too few for a standard error"}. Shadow rays: ${rays.join(", ")}.`);
