@@ -272,7 +272,8 @@ fn harmonics_are_near_the_exact_irradiance() {
     for engine in [Engine::Bevy, Engine::Three, Engine::Filament] {
         for probe in [BuiltinProbe::Sky, BuiltinProbe::Studio, BuiltinProbe::Cathedral] {
             let environment = Environment::from_image(probe.image(64)).unwrap();
-            let settings = IblSettings { axes: engine.axes(), ..small(16) };
+            let axes = engine.axes();
+            let settings = IblSettings { axes, harmonics_window: false, ..small(16) };
             let light = prefilter(&environment, &settings).unwrap();
             let cube = &light.irradiance;
             let brightest = cube.texels.iter().map(|t| t.max_component()).fold(0.0, f32::max);
@@ -293,7 +294,7 @@ fn harmonics_are_near_the_exact_irradiance() {
 /// Opposite to a sun, nine harmonics fall below zero, and their window prevents it.
 #[test]
 fn harmonics_are_not_negative() {
-    let environment = one_texel(32, 16, [9, 4], 1e3);
+    let environment = one_texel(32, 16, [9, 4], 1.0);
     let with = |harmonics_window| {
         let settings = IblSettings { axes: Engine::Three.axes(), harmonics_window, ..small(16) };
         prefilter(&environment, &settings).unwrap()
