@@ -308,7 +308,8 @@ fn harmonics_are_not_negative() {
     let [rings, windowed] = [false, true].map(with);
     assert!(darkest(&rings) < -0.01 && rings.harmonics_window == 1.0);
     assert!(darkest(&windowed) > -1e-6 && windowed.harmonics_window < 1.0);
-    assert_eq!(rings.harmonics.coefficients[0], windowed.harmonics.coefficients[0]);
+    let constant = |light: &PrefilteredLight| light.harmonics.coefficients[0].r;
+    assert!((constant(&windowed) / constant(&rings) - 1.0).abs() < 1e-6);
 }
 
 #[test]
