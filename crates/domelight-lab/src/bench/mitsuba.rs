@@ -21,6 +21,7 @@ use tempfile::TempDir;
 
 use super::cases::{BuiltCase, CaseMaterial};
 use super::ply;
+use super::{BenchSettings, Peer};
 use crate::measure::{Cache, Goal, Key, Reference, ReferencePicture};
 use crate::scene::PreparedScene;
 use crate::usage::Seconds;
@@ -74,7 +75,14 @@ impl Drop for Mitsuba {
 }
 
 impl Mitsuba {
-    pub(super) fn start(python: &Path, threads: usize) -> Result<Self, Error> {
+    /// The one that the settings ask for.
+    pub(super) fn of_settings(settings: &BenchSettings) -> Result<Option<Self>, Error> {
+        let threads = rayon::current_num_threads();
+        let peer = settings.vs.as_ref();
+        peer.map(|Peer::Mitsuba { python }| Self::start(python, threads)).transpose()
+    }
+
+    fn start(python: &Path, threads: usize) -> Result<Self, Error> {
         let name = python.display().to_string();
         let folder = TempDir::new().at("cannot make a temporary folder")?;
         let messages = fs::File::create(folder.path().join(MESSAGES))?;

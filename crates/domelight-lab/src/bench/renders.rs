@@ -4,6 +4,7 @@ use std::cell::RefCell;
 
 use serde::{Deserialize, Serialize};
 
+use super::Bench;
 use super::bench_run::{
     BenchRun, BenchStrategy, BudgetPoint, CostAtError, ErrorMetric, HEADLINE, Limits, StrategyEntry,
 };
@@ -12,7 +13,6 @@ use super::cases::{self, BuiltCase, Case, short};
 use super::fit::Fit;
 use super::mitsuba::{Mitsuba, MitsubaScene};
 use super::table::{Table, number};
-use super::{Bench, Peer};
 use crate::measure::{Cache, Goal, MIS, Reference, ReferenceReport};
 use crate::names::file_name;
 use crate::strategy::NamedStrategy;
@@ -102,10 +102,7 @@ fn run(
     {
         strategies.push(optimum.parse()?);
     }
-    let threads = rayon::current_num_threads();
-    let peer = settings.vs.as_ref();
-    let peer = peer.map(|Peer::Mitsuba { python }| Mitsuba::start(python, threads));
-    let peer = peer.transpose()?.map(RefCell::new);
+    let peer = Mitsuba::of_settings(settings)?.map(RefCell::new);
     let errors = match (&settings.errors[..], quality_of) {
         ([], None) => &ERRORS[..],
         ([], Some(_)) => &LECTURE_ERRORS,

@@ -11,10 +11,10 @@ use domelight::scene::{Camera, CameraSettings, Scene, SceneDescription};
 use domelight::strategy::{PreparedStrategy, StrategySpec};
 use serde::{Deserialize, Serialize};
 
+use super::Bench;
 use super::cases::{self, CaseMaterial, short};
 use super::mitsuba::{Mitsuba, MitsubaScene};
 use super::table::{Table, number};
-use super::{Bench, Peer};
 use crate::job::{FilePart, load_scene};
 use crate::scene::view_of;
 use crate::usage::{Seconds, Stopwatch};
@@ -86,27 +86,25 @@ pub(super) struct Row {
 
 pub(super) fn run(bench: &Bench, rows: &mut Vec<Row>) -> Result<(), Error> {
     let environments = cases::environments(bench.settings, &[256], bench.host)?;
-    let threads = rayon::current_num_threads();
-    let peer = bench.settings.vs.as_ref();
-    let peer = peer.map(|Peer::Mitsuba { python }| Mitsuba::start(python, threads));
-    let mut peer = peer.transpose()?;
+    let mut peer = Mitsuba::of_settings(bench.settings)?;
     let builtin = Interior::ALL.map(|interior| interior.name().to_owned());
     let given = &bench.settings.meshes[..];
     for scene in if given.is_empty() { &builtin[..] } else { given } {
         let interior = Interior::from_name(scene);
         let usual = if interior.is_some() { MATERIALS } else { MATERIALS_OF_FILES };
         let materials = bench.settings.materials.as_deref().unwrap_or(usual);
+        let materials = cases::case_materials(materials)?;
         let description = match interior {
             Some(interior) => interior.describe(),
             None => load_scene(scene, &FilePart::default(), false, bench.host)?.0,
         };
         for (probe, environment) in &environments {
-            for material in cases::case_materials(materials)? {
+            for material in &materials {
                 let [scene, probe] = [scene, probe].map(|name| short(name).to_owned());
                 bench.host.status(&format!("{scene} / {probe} / {material}"));
-                let case = InteriorCase::new(bench, &description, environment, &material);
+                let case = InteriorCase::new(bench, &description, environment, material);
                 let case = case.at(&scene)?;
-                for measured in case.measure(bench, &material, peer.as_mut())? {
+                for measured in case.measure(bench, material, peer.as_mut())? {
                     let (scene, probe) = (scene.clone(), probe.clone());
                     rows.push(Row { scene, probe, material: material.to_string(), ..measured });
                 }
