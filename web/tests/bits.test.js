@@ -6,7 +6,7 @@ import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { bytesOf, close, drop, launch, open as openPage, pixelsOf, program, rendered, renderedAnew, slide } from "./page.js";
+import { bytesOf, close, drop, launch, open, pixelsOf, program, rendered, renderedAnew, slide } from "./page.js";
 import { requireTheSame } from "./same.js";
 
 // One for each kind of strategy, and for what differs most within a kind.
@@ -14,9 +14,6 @@ const STRATEGIES = [
   "brdf:2", "environment:2", "mis:2:1", "mis:1:1:heuristic=balance:no-compensation", "product:8", "product:3", "rejection:8",
   "rejection:rays=2:tries=16", "sir:2/32", "sir:2", "sir:2/16:from=brdf:resampling=multinomial", "median-cut:16", "variance-minimization:16",
 ];
-
-/** Opens the page; the error of a picture is not tested here. */
-const open = (hash, options) => openPage(hash, { refers: false, ...options });
 
 before(launch);
 after(close);

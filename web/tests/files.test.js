@@ -126,7 +126,7 @@ test("files beyond what memory holds are refused before they are read", async ()
 test("memory is bounded while the camera orbits", async () => {
   // A film kept of each of some 200 views would be 200 MB. More by hand: an hour is 3600.
   const seconds = Number(process.env.ORBIT_SECONDS ?? 8);
-  const { page, done } = await open("size=256&spp=4&rows=64&view=error");
+  const { page, done } = await open("size=256&spp=4&rows=64&view=error", { refers: true });
   await rendered(page);
   await page.focus("#viewer");
   const orbit = async (seconds) => {

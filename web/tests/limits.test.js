@@ -14,7 +14,7 @@ const START = 10_000, TASK = 400;
 /** Programs for each core: times grow with it. */
 const busy = Math.max(1, loadavg()[0] / availableParallelism());
 
-before(launch);
+before(() => launch({ isCold: true }));
 after(close);
 
 test("the page is one file of 6 MB at most", () => {
@@ -24,7 +24,7 @@ test("the page is one file of 6 MB at most", () => {
 test("the first picture is seen soon, and the page answers while it renders", async () => {
   const script = "window.long = []; new PerformanceObserver((list) => window.long.push(...list.getEntries().map((entry) => entry.duration))).observe({ type: 'longtask', buffered: true });";
   const start = performance.now();
-  const { page, done } = await open("", { script });
+  const { page, done } = await open("", { script, refers: true });
   const seen = performance.now() - start;
   assert.ok(seen < START * busy, `${Math.round(seen)} ms to the first picture`);
   await page.evaluate(() => window.long.splice(0));

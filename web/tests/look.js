@@ -28,7 +28,7 @@ await launch();
 for (const [name, hash, query] of VIEWS.filter(([name]) => wanted(name))) {
   for (const width of WIDTHS) {
     for (const colorScheme of ["light", "dark"]) {
-      const { page, done } = await open(`${STATE}&${hash}`, { query, viewport: { width, height: 900 }, colorScheme, reducedMotion: "reduce" });
+      const { page, done } = await open(`${STATE}&${hash}`, { query, viewport: { width, height: 900 }, colorScheme, reducedMotion: "reduce", refers: true });
       const [, panel = "picture"] = /panel=(\w+)/.exec(hash) ?? [];
       await (panel in DRAWN ? page.waitForSelector(DRAWN[panel]) : rendered(page));
       await page.waitForTimeout(1500);
@@ -39,7 +39,7 @@ for (const [name, hash, query] of VIEWS.filter(([name]) => wanted(name))) {
 }
 // The lecture as a room sees it.
 for (const step of STEPS.filter((step) => wanted(`present-${String(step).padStart(2, "0")}`))) {
-  const { page, done } = await open(`${STATE}&panel=lecture&step=${step}`, { viewport: { width: 1920, height: 1080 }, reducedMotion: "reduce" });
+  const { page, done } = await open(`${STATE}&panel=lecture&step=${step}`, { viewport: { width: 1920, height: 1080 }, reducedMotion: "reduce", refers: true });
   await page.waitForSelector("#figure[data-drawn]");
   await page.keyboard.press("f");
   await page.waitForTimeout(1500);

@@ -28,7 +28,7 @@ function ofProgram(strategy, spp) {
   return stderr.trim().split(" ").reduce((sum, seconds) => sum + Number(seconds), 0);
 }
 
-await launch();
+await launch({ isCold: true });
 
 /** Notes when the page shows its preview, and its first tiles of the whole picture, since its navigation began [ms]. */
 const NOTES = `window.seen = [];
@@ -38,7 +38,7 @@ const NOTES = `window.seen = [];
   }, true);`;
 const times = [];
 for (let i = 0; i < OPENED; i++) {
-  const { page, done } = await open("", { script: NOTES });
+  const { page, done } = await open("", { script: NOTES, refers: true });
   await page.waitForFunction(() => window.seen.length > 1);
   times.push(await page.evaluate(() => window.seen.map(([, at]) => at)));
   await done();
@@ -55,7 +55,7 @@ function longInTrace(trace) {
   const tasks = traceEvents.filter((event) => event.name === "RunTask" && event.tdur > 50_000 && isMain(event));
   return tasks.map(({ tdur }) => Math.round(tdur / 1000));
 }
-const { page, done } = await open("");
+const { page, done } = await open("", { refers: true });
 const browser = page.context().browser();
 const trace = { start: () => browser.startTracing(page, { categories: ["toplevel", "devtools.timeline", "disabled-by-default-devtools.timeline"] }), stop: async () => longInTrace(String(await browser.stopTracing())) };
 await page.goto("about:blank");

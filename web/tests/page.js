@@ -20,19 +20,29 @@ export const address = pathToFileURL(file).href;
 /** A small picture of what loads quickest, and no more samples than a test needs. */
 export const SMALL = "size=64&spp=4&rows=64&scene=sphere";
 
-let browser;
-export async function launch() {
+const OPTIONS = { viewport: { width: 1280, height: 900 }, acceptDownloads: true };
+/** The context of all pages, unless each begins with a process of its own. */
+let browser, shared;
+
+/** Starts the browser. All pages share a process, in which one stays open, so that only this one compiles the engine; `isCold`
+ *  leaves that to each page. */
+export async function launch({ isCold = false } = {}) {
   browser = await chromium.launch({
     executablePath: browserPath,
-    args: ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+    args: ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--process-per-site"],
   });
+  if (isCold) return;
+  shared = await browser.newContext(OPTIONS);
+  const kept = await shared.newPage();
+  await kept.goto(`${address}?embed=step#panel=lecture`);
+  await kept.waitForSelector("html[data-ready]");
 }
 export const close = () => browser?.close();
 
 /** How much slower the page's main thread is made, to test what happens on a slow machine. */
 const throttling = Number(process.env.THROTTLE ?? 1);
 
-/** Never makes a reference for the picture's error, which would take time from what is tested. */
+/** Never makes a reference for the picture's error, which takes time from what is tested. */
 const WITHOUT_REFERENCE = `Object.defineProperty(window, "domelight", { configurable: true, set(value) {
   value.picture.reference.run = () => {};
   Object.defineProperty(window, "domelight", { value });
@@ -49,9 +59,10 @@ const BASE64 = `window.base64 = (bytes) => {
 export const bytesOf = async (page, find, argument) => Buffer.from(await page.evaluate(`(${find})(${JSON.stringify(argument)}).then(window.base64)`), "base64");
 
 /** Opens the page, from its file or from an address; whatever goes wrong there, or reaches for another place, fails the test. */
-export async function open(hash = SMALL, { query = "", at = `${address}${query}#${hash}`, script, ready = "html[data-ready]", refers = true, ...options } = {}) {
-  const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, acceptDownloads: true, ...options });
-  const page = await context.newPage();
+export async function open(hash = SMALL, { query = "", at = `${address}${query}#${hash}`, script, ready = "html[data-ready]", refers = false, viewport, ...media } = {}) {
+  const context = shared ?? await browser.newContext(OPTIONS), page = await context.newPage();
+  if (viewport) await page.setViewportSize(viewport);
+  await page.emulateMedia(media);
   await page.addInitScript(BASE64);
   if (script) await page.addInitScript(script);
   if (!refers) await page.addInitScript(WITHOUT_REFERENCE);
@@ -67,7 +78,7 @@ export async function open(hash = SMALL, { query = "", at = `${address}${query}#
   page.on("request", (request) => isOwn(request.url()) || complaints.push(request.url()));
   await page.goto(at);
   await page.waitForSelector(ready);
-  return { page, done: async () => { await context.close(); assert.deepEqual(complaints, []); } };
+  return { page, done: async () => { await (shared ? page : context).close(); assert.deepEqual(complaints, []); } };
 }
 
 /** Does what starts a picture, and waits for its last sample. */

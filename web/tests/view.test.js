@@ -11,7 +11,7 @@ import { after, before, test } from "node:test";
 import { close, file, launch, open, program, rendered, renderedAnew, show, slide, text } from "./page.js";
 import { requireTheSame } from "./same.js";
 
-before(launch);
+before(() => launch({ isCold: true }));
 after(close);
 
 /** Runs `domelight view` in a folder of its own, and opens its page. */
@@ -22,7 +22,7 @@ async function viewed(words, act, files = {}) {
   const child = spawn(program, ["view", "--no-open", "-q", `--page=${file}`, ...words], { cwd: folder, stdio: ["ignore", "pipe", "inherit"] });
   try {
     const [address] = await once(createInterface(child.stdout), "line");
-    const { page, done } = await open("", { at: address });
+    const { page, done } = await open("", { at: address, refers: true });
     await act(page, folder, child);
     await done();
   } finally {
