@@ -21,8 +21,10 @@ export const address = pathToFileURL(file).href;
 export const SMALL = "size=64&spp=4&rows=64&scene=sphere";
 
 const OPTIONS = { viewport: { width: 1280, height: 900 }, acceptDownloads: true };
-/** The context of all pages, unless each begins with a process of its own. */
-let browser, shared;
+
+let browser;
+/** The context of all pages, unless each compiles the engine. */
+let shared;
 
 /** Starts the browser. All pages share a process, in which one stays open, so that only this one compiles the engine; `isCold`
  *  leaves that to each page. */
