@@ -175,7 +175,7 @@ export const STEPS: Step[] = [
     title: "Rejection",
     text: [
       "The product cannot be inverted, but it can be sampled in two steps: draw samples from one factor, then adjust them until they follow the product. Two methods do that, rejection and resampling. To reject, sample that factor, and accept the direction with a probability proportional to the other factor; a bound on the ratio keeps the probability at most one.",
-      "Accepted directions follow the product exactly. The price is the number of tries, which grows with the looseness of the envelope and differs between pixels: the time of a picture cannot be known before. Tries that end with the N-th accepted direction count (N − 1)/(T − 1) of T tries as accepted: N/T would be biased.",
+      "Accepted directions follow the product exactly. The price is the number of tries, which grows with the looseness of the envelope and differs between pixels: the time of a picture cannot be known before. Tries that end with the N-th accepted direction count (N − 1)/(T − 1) of T tries as accepted: N/T would be biased.",
     ],
     formulas: [row(i("P"), par(i("keep")), eq, frac(ofKind("product", i("p"), par(wi)), ofKind("light", i("c"), o("·"), sub(i("q"), i("L")), par(wi))), eq, frac(row(fr, cos(i("i")), int(i("Ω")), Li, d, wi), row(i("c"), o("·"), Lns)), o("≤"), n(1)), row(i("E"), par(i("tries")), eq, i("c"))],
     question: "How do the accepted samples change when the bound is twice too high, and when it is too low?",

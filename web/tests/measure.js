@@ -1,13 +1,16 @@
-// What the page takes: its size, time to the first picture and to that of a new view, long tasks of the main thread by the
-// clock and by CPU time, time between frames, and CPU time against the program's. Prints a table, to be read on an idle
-// machine; on a busy one the least of several runs and CPU times still say something. web/measure runs it, in four minutes.
+// What the page takes: its size, time to the first picture and to that of a new view, by its own engine and by the program's,
+// long tasks of the main thread by the clock and by CPU time, time between frames, and CPU time against the program's. Prints
+// a table, to be read on an idle machine; on a busy one the least of several runs and CPU times still say something.
+// web/measure runs it, in four minutes.
 
-import { spawnSync } from "node:child_process";
+import { spawn, spawnSync } from "node:child_process";
+import { once } from "node:events";
 import { mkdtempSync, rmSync, statSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
+import { createInterface } from "node:readline";
 import { fileURLToPath } from "node:url";
-import { address, close, launch, open, program, rendered } from "./page.js";
+import { address, close, file, launch, open, program, rendered } from "./page.js";
 
 const SIZE = "320", SPP = "32";
 const line = (name, value) => console.log(`${name.padEnd(60)}${value}`);
@@ -43,9 +46,10 @@ for (let i = 0; i < OPENED; i++) {
   times.push(await page.evaluate(() => window.seen.map(([, at]) => at)));
   await done();
 }
-const opened = (k) => { const all = times.map((seen) => seen[k]); return `median ${Math.round(median(all))} ms, ${Math.round(Math.min(...all))} to ${Math.round(Math.max(...all))} ms`; };
-line("statue, first picture, 128 × 128, seen after", opened(0));
-line("the same, first tiles of 640 × 640 seen after", opened(1));
+/** Median, least and greatest of times [ms]. */
+const spread = (all) => `median ${Math.round(median(all))} ms, ${Math.round(Math.min(...all))} to ${Math.round(Math.max(...all))} ms`;
+line("statue, first picture, 128 × 128, seen after", spread(times.map((seen) => seen[0])));
+line("the same, first tiles of 640 × 640 seen after", spread(times.map((seen) => seen[1])));
 
 /** CPU times over 50 ms of tasks of the page's main thread in a trace [ms]. */
 function longInTrace(trace) {
@@ -72,17 +76,20 @@ const told = (list) => (list.length ? `${list.join(", ")} ms` : "none");
 const both = async () => `${told(await tasks())}; by CPU time ${told(await trace.stop())}`;
 line("tasks of the main thread over 50 ms, from the start on", await both());
 await trace.start();
-await page.focus("#viewer");
-const previews = [];
-for (let i = 0; i < 24; i++) {
-  await page.evaluate(() => delete document.documentElement.dataset.preview);
-  await page.keyboard.press("ArrowLeft");
-  await page.waitForSelector("html[data-preview]");
-  previews.push(Number(await page.evaluate(() => document.documentElement.dataset.preview)));
-  await page.waitForTimeout(i % 2 ? 700 : 60);
+/** The times to the first pictures of new views [ms]. */
+async function newViews(page) {
+  const times = [];
+  await page.focus("#viewer");
+  for (let i = 0; i < 24; i++) {
+    await page.evaluate(() => delete document.documentElement.dataset.preview);
+    await page.keyboard.press("ArrowLeft");
+    await page.waitForSelector("html[data-preview]");
+    times.push(Number(await page.evaluate(() => document.documentElement.dataset.preview)));
+    await page.waitForTimeout(i % 2 ? 700 : 60);
+  }
+  return times;
 }
-const sorted = [...previews].sort((a, b) => a - b);
-line("first picture of a new view", `median ${median(previews)} ms, ${sorted[0]} to ${sorted.at(-1)} ms`);
+line("first picture of a new view", spread(await newViews(page)));
 line("tasks of the main thread over 50 ms, orbiting", await both());
 
 // A drag around the scene, as fast as the page draws frames.
@@ -105,6 +112,27 @@ const frames = (await page.evaluate(() => window.intervals)).slice(1).sort((a, b
 const quantile = (q) => frames[Math.floor(q * (frames.length - 1))].toFixed(1);
 line("time between frames, dragging", `median ${quantile(0.5)} ms, 95 % under ${quantile(0.95)} ms, of ${frames.length}`);
 await done();
+
+/** The program as the page's engine: times from its start to its address and to the first picture, and of new views [ms]. */
+const started = [], shown = [], views = [];
+for (let i = 0; i < OPENED; i++) {
+  const start = Date.now();
+  const child = spawn(program, ["view", "--no-open", "-q", `--page=${file}`], { stdio: ["ignore", "pipe", "inherit"] });
+  const [at] = await once(createInterface(child.stdout), "line");
+  started.push(Date.now() - start);
+  const { page, done } = await open("", { at, script: NOTES });
+  await page.waitForFunction(() => window.seen.length > 0);
+  shown.push(await page.evaluate(() => performance.timeOrigin + window.seen[0][1]) - start);
+  if (i === 0) {
+    await rendered(page);
+    views.push(...await newViews(page));
+  }
+  await done();
+  child.kill("SIGKILL");
+}
+line("domelight view, address printed after", spread(started));
+line("the same, first picture seen after", spread(shown));
+line("the same, first picture of a new view", spread(views));
 await close();
 
 for (const strategy of ["mis:1:1", "product:8"]) {

@@ -110,7 +110,7 @@ export const rejection = (stage: Stage) => {
       { name: "envelope c · q", kind: "light", points: line(400, height) }, { name: "target", kind: "product", points: line(400, target) }, marker(at, top),
     ], { x: { name: "direction, drag the envelope up and down", range: [0, 1] }, y: { name: "density", range: [0, top] }, height: 280, presented: 480 }), "Tries under an envelope");
     stage.read(at === undefined ? null : `Direction ${at.toFixed(2)}: target ${short(target(at))}, envelope ${short(height(at))}; a try is kept with probability ${Math.min(target(at) / height(at), 1).toFixed(2)}.`);
-    stage.say(`${kept.length} of ${tries} tries are kept (1 / c = ${short(1 / c)})${envelope.lost > 1e-3 ? `; ${short(100 * envelope.lost)} % of the target exceeds the envelope and is lost` : ""}.`);
+    stage.say(`${kept.length} of ${tries} tries are kept (1/c = ${short(1 / c)})${envelope.lost > 1e-3 ? `; ${short(100 * envelope.lost)} % of the target exceeds the envelope and is lost` : ""}.`);
   });
 };
 
