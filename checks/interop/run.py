@@ -23,6 +23,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE / "consumers")]
 
 import balls
+import debug_probe
 import mitsuba3
 import probe
 import proofs
@@ -502,6 +503,32 @@ def check_ktx2(table):
             table.check("ktx-parse", f"{texels}: texels", off, limit)
 
 
+def check_playcanvas(table):
+    """The map of axes in PlayCanvas, as the panorama and as the cube that are written for it."""
+    folder, size = OUT / "playcanvas", 256
+    folder.mkdir(parents=True, exist_ok=True)
+    domelight("conventions", "--size", debug_probe.ROWS, "-o", folder / "axes.pfm")
+    domelight("probe", folder / "axes.pfm", "--for", "playcanvas", "-o", folder / "panorama.exr")
+    # A cube shows the map as PlayCanvas shows the same file as a panorama.
+    domelight("ibl", folder / "panorama.exr", "--for", "playcanvas", "-o", f"{folder}/cube/")
+    axes = probe.read_pfm(folder / "axes.pfm")
+    maps = {"panorama": "panorama.exr", "cube": "cube/radiance_00.exr"}
+    job = {"folder": str(folder), "views": debug_probe.VIEWS, "size": size, "maps": list(maps.values())}
+    (folder / "job.json").write_text(json.dumps(job))
+    done = subprocess.run(["node", HERE / "web" / "look.mjs", folder / "job.json"], capture_output=True, text=True)
+    sys.stderr.write(done.stderr)
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+    name = f"PlayCanvas {json.loads(done.stdout)['playcanvas']}"
+    for what, file in maps.items():
+        seen = np.fromfile(folder / f"{file}.f32", "<f4").reshape(6, size, size, 4)[:, ::-1, :, :3].astype(float)
+        dots, sun, mean = debug_probe.distances(axes, seen)
+        with table.proving("ibl", f"{name}, rendered", ".exr") if what == "cube" else contextlib.nullcontext():
+            table.check(name, f"{what}: dots in 26 directions", dots, 0.005)
+            table.check(name, f"{what}: sun, in texels", sun, 0.5, 0.01, "{:.3f}")
+            table.check(name, f"{what}: mean", mean, 0.005)
+
+
 def check_tracer(table):
     """The example that samples a map by its tables: no bias, and less noise than without them."""
     folder = OUT / "tracer"
@@ -638,6 +665,7 @@ def main():
         ("pbrt-v4, sIBL", check_readers),
         ("Godot, Unreal, Unity, Bevy", check_engines),
         ("prefiltered light in three.js, Babylon.js, Filament", lambda table, _: check_balls(table)),
+        ("the map of axes in PlayCanvas", lambda table, _: check_playcanvas(table)),
         ("prefiltered light in KTX2", lambda table, _: check_ktx2(table)),
         ("path tracing by tables in three.js", lambda table, _: check_tracer(table)),
         ("names of files", lambda table, _: check_names(table)),
