@@ -5,13 +5,17 @@ import { $, count, fill, h, percentage, save, words } from "./dom";
 import { lightWords, quoted } from "./state";
 
 /** The engines' own names. */
-const ENGINES: Record<string, string> = { three: "three.js", filament: "Filament", babylon: "Babylon.js", godot: "Godot", bevy: "Bevy", unreal: "Unreal" };
+const ENGINES: Record<string, string> = { three: "three.js", filament: "Filament", babylon: "Babylon.js", godot: "Godot", bevy: "Bevy", unreal: "Unreal", playcanvas: "PlayCanvas" };
+const LAYOUTS: Record<string, string> = { cube: "cube", octahedral: "octahedral square" };
+/** The extension of all files in one. */
+const ARCHIVE = "zip";
 const LANGUAGES: Record<string, string> = { wgsl: "WGSL", glsl: "GLSL", hlsl: "HLSL", slang: "Slang", cuda: "CUDA", metal: "Metal" };
 
 interface Targets {
   engines: string[];
   /** Formats of prefiltered light, and the only engine that reads one. */
   files: { extension: string; engine: string | null }[];
+  layouts: string[];
   languages: { name: string; extension: string }[];
   /** The usual number of texels of tables. */
   texels: number;
@@ -45,13 +49,19 @@ export class EngineLight {
   private async show() {
     if (this.app.state.panel !== "lights") return;
     if (!this.targets) {
-      const { engines, files, languages, texels } = (this.targets = JSON.parse(await this.app.engines.call("targets")) as Targets);
+      const { engines, files, layouts, languages, texels } = (this.targets = JSON.parse(await this.app.engines.call("targets")) as Targets);
       fill($("ibl-engine"), [["", "any: roughness = level / last level"], ...engines.map((name): [string, string] => [name, ENGINES[name] ?? name])], "");
-      fill($("ibl-file"), files.map(({ extension, engine }): [string, string] => [extension, engine ? `.${extension}, for ${ENGINES[engine] ?? engine}` : `.${extension}`]), files[0].extension);
+      fill($("ibl-layout"), layouts.map((name): [string, string] => [name, LAYOUTS[name] ?? name]), layouts[0]);
+      fill($("ibl-file"), files.map(({ extension, engine }): [string, string] => [extension, this.fileWords(extension, engine)]), files[0].extension);
       fill($("tables-language"), languages.map(({ name }): [string, string] => [name, LANGUAGES[name] ?? name]), languages[0].name);
       fill($("tables-texels"), [1 / 32, 1 / 8, 1, 4].map((k): [string, string] => [String(k * texels), count(k * texels)]), String(texels));
     }
     this.offer();
+  }
+
+  private fileWords(extension: string, engine: string | null) {
+    if (engine) return `.${extension}, for ${ENGINES[engine] ?? engine}`;
+    return extension === ARCHIVE ? `.${extension}, a folder with OpenEXR pictures` : `.${extension}`;
   }
 
   /** The name of the files without their extensions. */
@@ -68,17 +78,18 @@ export class EngineLight {
   }
 
   private offerPrefiltered({ files }: Targets) {
-    const { stem, app: { state } } = this, [size, texels, sun, clamp, extension] = ["size", "texels", "sun", "clamp", "file"].map((name) => chosen(`ibl-${name}`));
-    // A file for one engine holds the irradiance, and decides the format of its texels.
+    const { stem, app: { state } } = this, [size, texels, sun, clamp, extension, anyLayout] = ["size", "texels", "sun", "clamp", "file", "layout"].map((name) => chosen(`ibl-${name}`));
+    // A file for one engine holds a cube and the irradiance, and decides the format of its texels.
     const only = files.find((file) => file.extension === extension)?.engine, engine = only ?? chosen("ibl-engine");
-    $<HTMLSelectElement>("ibl-engine").disabled = $<HTMLSelectElement>("ibl-texels").disabled = Boolean(only);
+    for (const id of ["ibl-engine", "ibl-texels", "ibl-layout"]) $<HTMLSelectElement>(id).disabled = Boolean(only);
     if (only) $<HTMLSelectElement>("ibl-engine").value = only;
-    const settings = JSON.stringify({ engine, size: Number(size), texels, file: extension, sun, clamp: Number(clamp) });
+    const layout = only ? "cube" : anyLayout, isArchive = extension === ARCHIVE;
+    const settings = JSON.stringify({ engine, layout, size: Number(size), texels, file: extension, sun, clamp: Number(clamp) });
     const file = (content: string, suffix: string, meaning: string) => this.button(`${stem}${suffix}.${extension}`, meaning, () => this.prefiltered(settings, content));
-    const others = only ? [] : [file("irradiance", "_irradiance", "diffuse light"), file("brdf", "_brdf", "table of the BRDF")];
-    $("ibl-files").replaceChildren(file("radiance", "", "levels of roughness"), ...others);
-    const command = ["domelight", "ibl", ...lightWords(state), "-o", `${stem}.${extension}`, ...(only ? [] : ["--irradiance", `${stem}_irradiance.${extension}`, "--brdf", `${stem}_brdf.${extension}`]),
-      ...(engine ? ["--for", engine] : []), "--size", size, ...(sun === "keep" ? [] : ["--sun", sun === "clamp" ? `clamp:${clamp}` : sun]), ...(only || texels === "rgb9e5" ? [] : ["--texels", texels])];
+    const others = only || isArchive ? [] : [file("irradiance", "_irradiance", "diffuse light"), file("brdf", "_brdf", "table of the BRDF")];
+    $("ibl-files").replaceChildren(file("radiance", "", isArchive ? "everything" : "levels of roughness"), ...others);
+    const command = ["domelight", "ibl", ...lightWords(state), "-o", isArchive ? `${stem}/` : `${stem}.${extension}`, ...(only || isArchive ? [] : ["--irradiance", `${stem}_irradiance.${extension}`, "--brdf", `${stem}_brdf.${extension}`]),
+      ...(engine ? ["--for", engine] : []), ...(layout === "cube" ? [] : ["--layout", layout]), "--size", size, ...(sun === "keep" ? [] : ["--sun", sun === "clamp" ? `clamp:${clamp}` : sun]), ...(only || texels === "rgb9e5" ? [] : ["--texels", texels])];
     $("ibl-command").replaceChildren(...words(command.map(quoted)));
   }
 

@@ -2,10 +2,11 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
+import { crc32 } from "node:zlib";
 import { bytesOf, close, drop, launch, open, pixelsOf, program, rendered, renderedAnew, slide } from "./page.js";
 import { requireTheSame } from "./same.js";
 
@@ -66,6 +67,18 @@ test("exposure and curve are the command line's", async () => {
   await done();
 });
 
+/** The files of a ZIP archive without compression. */
+function unzipped(bytes) {
+  const files = new Map();
+  for (let at = 0; bytes.readUInt32LE(at) === 0x04034b50; ) {
+    const size = bytes.readUInt32LE(at + 22), start = at + 30 + bytes.readUInt16LE(at + 26);
+    assert.equal(crc32(bytes.subarray(start, start + size)), bytes.readUInt32LE(at + 14));
+    files.set(bytes.toString("latin1", at + 30, start), bytes.subarray(start, start + size));
+    at = start + size;
+  }
+  return files;
+}
+
 test("light for engines and shaders has the program's bytes", async () => {
   const folder = mkdtempSync(join(tmpdir(), "domelight-web-"));
   const { page, done } = await open("panel=lights&scene=sphere&env=studio&rows=32&rotate=30&ev=0.5&size=32&spp=1&lights=8&sun=true");
@@ -80,6 +93,18 @@ test("light for engines and shaders has the program's bytes", async () => {
       const name = download.suggestedFilename(), expected = readFileSync(join(folder, name));
       assert.ok(readFileSync(await download.path()).equals(expected), name);
     }
+  };
+  /** Compares the files of the archive with those of the folder that the command writes. */
+  const compareArchive = async () => {
+    const words = (await page.$eval("#ibl-command", (pre) => pre.textContent)).split(" ").slice(1);
+    assert.match(words.join(" "), /-o studio\/ .*--layout octahedral/);
+    execFileSync(program, ["-q", ...words], { cwd: folder });
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click("#ibl-files button")]);
+    assert.equal(download.suggestedFilename(), "studio.zip");
+    const files = unzipped(readFileSync(await download.path())), names = readdirSync(join(folder, "studio"));
+    assert.deepEqual([...files.keys()].sort(), names.sort());
+    assert.ok(names.includes("radiance_06.exr") && names.includes("irradiance.exr"));
+    for (const [name, bytes] of files) assert.ok(readFileSync(join(folder, "studio", name)).equals(bytes), name);
   };
   try {
     await page.selectOption("#ibl-size", "64");
@@ -96,6 +121,9 @@ test("light for engines and shaders has the program's bytes", async () => {
       await page.selectOption("#ibl-file", file);
       await compare("#ibl-files button", "#ibl-command");
     }
+    await page.selectOption("#ibl-file", "zip");
+    await page.selectOption("#ibl-layout", "octahedral");
+    await compareArchive();
     const cube = join(folder, "studio.dds");
     await page.selectOption("#tables-language", "glsl");
     await page.selectOption("#tables-texels", { index: 0 });

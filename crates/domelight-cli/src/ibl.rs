@@ -5,16 +5,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result};
 use domelight::environment::Environment;
 use domelight::files::create_folder;
-use domelight::picture::exr::ExrLayers;
-use domelight::picture::texture::{Container, EncodingLoss, RadianceFile, Texture};
-use domelight::rig::ibl::{
-    BrdfTable, Cube, Engine, IblSettings, PrefilteredLight, SunError, SunTreatment, TableTerms,
-    TreatedEnvironment, prefilter,
+use domelight::picture::texture::{
+    Container, EncodingLoss, IblFile, IblFolder, RadianceFile, Texture,
 };
-use domelight::rig::{RigError, RigLight};
+use domelight::rig::RigError;
+use domelight::rig::ibl::{
+    BrdfTable, Engine, IblSettings, Layout, SunError, SunTreatment, TreatedEnvironment, prefilter,
+};
 use domelight::scene::SceneDescription;
-use domelight::{Rgb, RgbImage};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::args::ibl::{IblArguments, IblPath, TexturePath};
 use crate::error::{UsageError, warn};
@@ -29,6 +28,7 @@ use domelight_lab::names::file_name;
 pub(crate) fn run(arguments: &IblArguments, quiet: bool) -> Result<()> {
     let engine = arguments.target()?;
     let settings = IblSettings {
+        layout: arguments.layout,
         harmonics_window: !arguments.no_sh_window,
         ..IblSettings::for_engine(engine, arguments.size as usize)
     };
@@ -40,10 +40,11 @@ pub(crate) fn run(arguments: &IblArguments, quiet: bool) -> Result<()> {
     let loss = arguments.radiance_file().loss(&light);
     arguments.report_loss(loss, &probe, quiet)?;
     let sun = treated.sun.as_ref().and_then(|rig| rig.lights.first());
-    let description = json_of(&light, &settings, sun);
-    results.write(arguments, &light, Engine::terms(engine), &description)?;
+    let texels = arguments.texel_format();
+    let folder = IblFolder { light: &light, settings: &settings, engine, texels, sun };
+    results.write(&folder)?;
     if arguments.json {
-        let mut report = description;
+        let mut report = folder.description();
         report["probe"] = probe.into();
         report["engine"] = engine.map(Engine::name).into();
         report["clipped"] = json!({ "texels": loss.texels, "lost": loss.clipped });
@@ -67,12 +68,13 @@ impl IblArguments {
         let light = given.over(&SceneDescription::default());
         let map = given.load(&light, &Terminal { quiet })?;
         let probe = self.light.map.clone().unwrap_or_default();
-        let cubes = 8 * settings.size.pow(2) as u64;
+        // All levels together have a third more texels than the first.
+        let filtered = settings.layout.texels(settings.size).div_ceil(3) as u64 * 4;
         let treated = match self.sun {
             SunTreatment::Keep => 0,
             SunTreatment::Remove | SunTreatment::Clamp(_) => memory::EXTRACTION_TEXEL,
         };
-        let bytes = cubes * memory::IBL_TEXEL
+        let bytes = filtered * memory::IBL_TEXEL
             + memory::IBL_HIERARCHY
             + (Environment::MEMORY_PER_TEXEL + treated) * map.pixels.len() as u64;
         memory::allow(&format!("{probe}: its prefiltered light"), bytes)?;
@@ -127,29 +129,32 @@ enum Content {
     Radiance(RadianceFile),
     Irradiance(Container),
     Table(Container),
-    /// One level as a strip of faces.
-    LevelPicture(usize),
-    IrradiancePicture,
-    /// Levels and coefficients.
-    Description,
+    /// One of the files of a folder.
+    File(IblFile),
 }
 
 impl Content {
     fn description(self, settings: &IblSettings) -> String {
-        let IblSettings { size, roughness, .. } = settings;
+        let IblSettings { layout, size, roughness, .. } = settings;
+        let (a_map, picture) = match layout {
+            Layout::Cube => ("a cube", "six faces"),
+            Layout::Octahedral => ("an octahedral map", "an octahedral map"),
+        };
         match self {
-            Self::Radiance(_) => {
-                format!("a cube of {size}x{size} texels with {} levels", roughness.len())
+            Self::Radiance(_) | Self::File(IblFile::Radiance) => {
+                format!("{a_map} of {size}x{size} texels with {} levels", roughness.len())
             }
-            Self::Irradiance(_) => "irradiance over π, a cube".into(),
-            Self::Table(_) => {
+            Self::Irradiance(_) | Self::File(IblFile::Irradiance) => {
+                format!("irradiance over π, {a_map}")
+            }
+            Self::Table(_) | Self::File(IblFile::Table) => {
                 "the table of the BRDF: cos θ to the right, roughness downward".into()
             }
-            Self::LevelPicture(level) => {
-                format!("level {level}, roughness {:.3}, six faces", roughness[level])
+            Self::File(IblFile::LevelPicture(level)) => {
+                format!("level {level}, roughness {:.3}, {picture}", roughness[level])
             }
-            Self::IrradiancePicture => "irradiance over π, six faces".into(),
-            Self::Description => "levels and spherical harmonics".into(),
+            Self::File(IblFile::IrradiancePicture) => format!("irradiance over π, {picture}"),
+            Self::File(IblFile::Description) => "levels and spherical harmonics".into(),
         }
     }
 }
@@ -169,15 +174,9 @@ impl Results {
                 None
             }
             IblPath::Folder(folder) => {
-                let mut add = |name: &str, content| files.push((folder.join(name), content));
-                add("radiance.ktx2", Content::Radiance(arguments.radiance_file()));
-                add("irradiance.ktx2", Content::Irradiance(Container::Ktx2));
-                add("brdf.ktx2", Content::Table(Container::Ktx2));
-                for level in 0..n_levels {
-                    add(&format!("radiance_{level:02}.exr"), Content::LevelPicture(level));
-                }
-                add("irradiance.exr", Content::IrradiancePicture);
-                add("ibl.json", Content::Description);
+                files.extend(
+                    IblFile::all(n_levels).map(|f| (folder.join(f.name()), Content::File(f))),
+                );
                 Some(folder.clone())
             }
         };
@@ -199,34 +198,23 @@ impl Results {
         Ok(())
     }
 
-    fn write(
-        &self,
-        arguments: &IblArguments,
-        light: &PrefilteredLight,
-        terms: TableTerms,
-        description: &Value,
-    ) -> Result<()> {
+    fn write(&self, content: &IblFolder) -> Result<()> {
         if let Some(folder) = &self.folder {
             create_folder(folder).with_context(|| folder.display().to_string())?;
         }
-        for (path, content) in &self.files {
-            match content {
+        let IblFolder { light, engine, texels, .. } = *content;
+        for (path, written) in &self.files {
+            match written {
                 Content::Radiance(file) => files::write(path, |out| file.encode(light, out))?,
                 Content::Irradiance(container) => {
                     let levels = std::slice::from_ref(&light.irradiance);
-                    let (texture, _) = Texture::cube(levels, arguments.texel_format());
-                    write_texture(path, *container, &texture)?;
+                    write_texture(path, *container, &Texture::light(levels, texels).0)?;
                 }
                 Content::Table(container) => {
-                    let table = BrdfTable::new(BrdfTable::SIZE, terms);
+                    let table = BrdfTable::new(BrdfTable::SIZE, Engine::terms(engine));
                     write_texture(path, *container, &Texture::table(&table))?;
                 }
-                Content::LevelPicture(level) => write_strip(path, &light.levels[*level])?,
-                Content::IrradiancePicture => write_strip(path, &light.irradiance)?,
-                Content::Description => {
-                    let text = serde_json::to_string_pretty(description)?;
-                    files::write(path, |out| writeln!(out, "{text}"))?;
-                }
+                Content::File(file) => files::write(path, |out| content.encode(*file, out))?,
             }
         }
         Ok(())
@@ -235,30 +223,4 @@ impl Results {
 
 fn write_texture(path: &Path, container: Container, texture: &Texture) -> Result<()> {
     files::write(path, |out| container.encode(texture, out))
-}
-
-/// The faces of a cube from top to bottom.
-fn write_strip(path: &Path, cube: &Cube) -> Result<()> {
-    let picture = RgbImage::new(cube.size, 6 * cube.size, cube.texels.clone());
-    let bytes = ExrLayers::from_image(&picture, None).encode()?;
-    files::write(path, |out| out.write_all(&bytes))
-}
-
-/// Levels, harmonics and the removed sun.
-fn json_of(light: &PrefilteredLight, settings: &IblSettings, sun: Option<&RigLight>) -> Value {
-    let levels = light.levels.iter().zip(&settings.roughness);
-    let level =
-        |(cube, roughness): (&Cube, &f32)| json!({ "size": cube.size, "roughness": roughness });
-    json!({
-        "levels": levels.map(level).collect::<Vec<_>>(),
-        "irradiance_size": light.irradiance.size,
-        "harmonics": light.harmonics.coefficients.map(Rgb::to_array),
-        "harmonics_window": light.harmonics_window,
-        "axes": settings.axes.world.map(|axis| axis.to_array()),
-        "sun": sun.map(|sun| json!({
-            "direction": sun.direction.to_array(),
-            "irradiance": sun.irradiance.to_array(),
-            "angular_radius": sun.angular_radius,
-        })),
-    })
 }

@@ -92,6 +92,39 @@ fn a_folder_of_everything() {
 }
 
 #[test]
+fn octahedral_maps_are_squares_that_probes_read() {
+    let folder = probes();
+    let base = ["ibl", "sun.exr", "--layout", "octahedral", "--size", "64", "--sun", "clamp:1e4"];
+    let report = json(&domelight(&folder, &[&base[..], &["-q", "--json", "-o", "out/"]].concat()));
+    assert_eq!(report["layout"], "octahedral");
+    let read = |name: &str| fs::read(folder.path().join(name)).expect(name);
+    // RGB9E5, 64 × 64, one face, levels of 64 to 1 columns.
+    assert_eq!(
+        [12, 20, 24, 36, 40].map(|at| word(&read("out/radiance.ktx2"), at)),
+        [123, 64, 64, 1, 7]
+    );
+    let level = load(&folder, "out/radiance_02.exr");
+    assert_eq!((level.width, level.height), (16, 16));
+    let single = load(&folder, "out/radiance_06.exr");
+    assert_eq!((single.width, single.height), (1, 1));
+    done(&domelight(&folder, &[&base[..], &["-q", "-o", "map.dds"]].concat()));
+    assert_eq!([12, 16, 28, 112].map(|at| word(&read("map.dds"), at)), [64, 64, 7, 0]);
+    // Level 0 is the map itself.
+    let back = ["probe", "out/radiance_00.exr", "--mapping", "octahedral", "--json"];
+    let back = json(&domelight(&folder, &back));
+    let original = json(&domelight(&folder, &["probe", "sun.exr", "--json"]));
+    for axis in 0..3 {
+        let of = |report: &serde_json::Value| report["sun"]["direction"][axis].as_f64().unwrap();
+        assert!((of(&back) - of(&original)).abs() < 0.06, "{back} {original}");
+    }
+    for name in ["a.ktx", "a.env"] {
+        let refused =
+            domelight(&folder, &["ibl", "gray.exr", "--layout", "octahedral", "-o", name]);
+        ended(&refused, 2, &["--layout", "octahedral", ".ktx2"]);
+    }
+}
+
+#[test]
 fn harmonics_go_through_a_window_on_demand() {
     let folder = probes();
     let with = |probe: &str, more: &[&str]| {
@@ -223,7 +256,7 @@ fn cubes_for_engines_are_turned_back() {
     cube(&["plain.ktx2"]);
     let expected = read("plain.ktx2", &[]);
     done(&domelight(&folder, &["probe", "plain.ktx2", "-q", "-o", "plain.pfm"]));
-    for engine in ["three", "filament", "babylon", "godot", "bevy", "unreal"] {
+    for engine in ["three", "filament", "babylon", "godot", "bevy", "unreal", "playcanvas"] {
         for name in ["cube.ktx2", "cube.dds"] {
             cube(&[name, "--for", engine]);
             assert_ne!(read(name, &[]), expected, "{engine}");

@@ -170,7 +170,7 @@ fn conventions_of_programs_undo_each_other() {
         pixels(&folder, "x.pfm")
     };
     let here = render("axes.exr", &[]);
-    for program in ["pbrt", "three", "godot"] {
+    for program in ["pbrt", "three", "godot", "playcanvas"] {
         let turned = ["probe", "axes.exr", "--for", program, "-q", "-o", "there.exr"];
         done(&domelight(&folder, &turned));
         assert_ne!(render("there.exr", &[]), here, "{program}");

@@ -4,8 +4,8 @@ use domelight::Rgb;
 use domelight::picture::texture::{Container, TexelFormat, Texture};
 use domelight::rig::RigError;
 use domelight::rig::ibl::{
-    BrdfTable, Engine, IblSettings, PrefilteredLight, SunError, SunTreatment, TreatedEnvironment,
-    prefilter,
+    BrdfTable, Engine, IblSettings, Layout, PrefilteredLight, SunError, SunTreatment,
+    TreatedEnvironment, prefilter,
 };
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
@@ -17,6 +17,7 @@ use crate::options::{named, parse, to_json};
 #[derive(Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct IblOptions {
+    layout: String,
     size: usize,
     #[serde(rename = "for")]
     engine: Option<String>,
@@ -30,6 +31,7 @@ struct IblOptions {
 impl Default for IblOptions {
     fn default() -> Self {
         Self {
+            layout: Layout::default().name().to_owned(),
             size: 256,
             engine: None,
             sun: "keep".to_owned(),
@@ -76,7 +78,8 @@ impl IblOptions {
             return Err(JsError::new(&format!("ibl: option size: {size} is not in [1, {most}]")));
         }
         let settings = IblSettings::for_engine(engine, self.size);
-        Ok(IblSettings { harmonics_window: self.sh_window, ..settings })
+        let layout = named("ibl", "layout", &self.layout)?;
+        Ok(IblSettings { layout, harmonics_window: self.sh_window, ..settings })
     }
 }
 
@@ -123,8 +126,8 @@ impl LightMap {
         let (treated, warning) = treated(self, named("ibl", "sun", &options.sun)?)?;
         let light =
             prefilter(&treated.environment, &settings).map_err(|e| JsError::new(&e.to_string()))?;
-        let (radiance, loss) = Texture::cube(&light.levels, texels);
-        let (irradiance, _) = Texture::cube(std::slice::from_ref(&light.irradiance), texels);
+        let (radiance, loss) = Texture::light(&light.levels, texels);
+        let (irradiance, _) = Texture::light(std::slice::from_ref(&light.irradiance), texels);
         let loss = loss.warning().map(|text| format!("{}: {text}", self.name));
         let brdf = Texture::table(&BrdfTable::new(BrdfTable::SIZE, Engine::terms(engine)));
         Ok(Prefiltered {
@@ -143,18 +146,18 @@ impl LightMap {
 
 fn levels(light: &PrefilteredLight, settings: &IblSettings) -> Vec<Level> {
     let levels = light.levels.iter().zip(&settings.roughness);
-    levels.map(|(cube, &roughness)| Level { size: cube.size, roughness }).collect()
+    levels.map(|(map, &roughness)| Level { size: map.size, roughness }).collect()
 }
 
 #[wasm_bindgen]
 impl Prefiltered {
-    /// The file of the cube of radiance, once.
+    /// The file of the radiance, once.
     #[wasm_bindgen(js_name = takeRadiance)]
     pub fn take_radiance(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.radiance)
     }
 
-    /// The file of the cube of irradiance over π, once.
+    /// The file of the irradiance over π, once.
     #[wasm_bindgen(js_name = takeIrradiance)]
     pub fn take_irradiance(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.irradiance)

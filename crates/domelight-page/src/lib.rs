@@ -3,6 +3,7 @@
 //!
 //! Settings come as JSON, results as JSON or as arrays of numbers. `domelight-web` binds the calls to JavaScript.
 
+mod archive;
 mod calls;
 mod direction;
 mod error;
@@ -26,11 +27,11 @@ use domelight::render::Checkpoint;
 use domelight::rig::Extraction;
 
 pub use calls::{Answer, Argument};
-use domelight::rig::ibl::PrefilteredLight;
 pub use error::Error;
 use files::Files;
 pub use host::{Host, Stamp};
 pub use map::MapView;
+use prefilter::Prefiltered;
 use session::Rendering;
 pub use session::{Statistics, Update};
 pub use setup::CameraState;
@@ -48,8 +49,8 @@ pub struct Engine {
     parts: Vec<Checkpoint>,
     /// The last rig, and its settings.
     extraction: Option<(String, Extraction)>,
-    /// The last prefiltered light, its settings and what there is to say of it.
-    prefiltered: Option<(String, String, PrefilteredLight)>,
+    /// The last prefiltered light.
+    prefiltered: Option<Prefiltered>,
 }
 
 impl Engine {

@@ -1,15 +1,24 @@
 //! Light for engines and shaders: prefiltered cubes, tables, and the code that samples them.
 
 use domelight::picture::exr::ExrLayers;
-use domelight::picture::texture::{Container, RadianceFile, TexelFormat, Texture};
-use domelight::rig::ibl::{BrdfTable, Engine as Target, IblSettings, SunTreatment, prefilter};
+use domelight::picture::texture::{
+    Container, IblFile, IblFolder, RadianceFile, TexelFormat, Texture,
+};
+use domelight::rig::RigLight;
+use domelight::rig::ibl::{
+    BrdfTable, Engine as Target, IblSettings, Layout, PrefilteredLight, SunTreatment, prefilter,
+};
 use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings};
 use domelight::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
+use crate::archive::Archive;
 use crate::error::refused;
 use crate::setup::{parse, to_json};
 use crate::{Engine, Error};
+
+/// The extension of all files in an archive, which the program writes into a folder.
+const ARCHIVE: &str = "zip";
 
 /// The settings of prefiltered light, as those of `domelight ibl`.
 #[derive(Deserialize)]
@@ -17,6 +26,7 @@ use crate::{Engine, Error};
 struct IblState {
     /// Empty for levels of linear roughness that are looked up with the world direction.
     engine: String,
+    layout: String,
     size: usize,
     texels: String,
     /// The extension of the radiance's file.
@@ -31,6 +41,7 @@ struct IblState {
 struct Offers {
     engines: Vec<&'static str>,
     files: Vec<File>,
+    layouts: Vec<&'static str>,
     languages: Vec<Language>,
     texels: usize,
 }
@@ -47,6 +58,17 @@ struct File {
 struct Language {
     name: &'static str,
     extension: &'static str,
+}
+
+/// Light, and what it was made with.
+pub(crate) struct Prefiltered {
+    /// The settings, as JSON.
+    of: String,
+    /// [`IblReport`], as JSON.
+    report: String,
+    settings: IblSettings,
+    sun: Option<RigLight>,
+    light: PrefilteredLight,
 }
 
 /// What prefiltered light is, for the page.
@@ -84,7 +106,15 @@ impl IblState {
         self.texels.parse().map_err(refused)
     }
 
+    fn settings(&self) -> Result<IblSettings, Error> {
+        let layout = self.layout.parse().map_err(refused)?;
+        Ok(IblSettings { layout, ..IblSettings::for_engine(self.target()?, self.size) })
+    }
+
     fn radiance_file(&self) -> Result<RadianceFile, Error> {
+        if self.file == ARCHIVE {
+            return Ok(RadianceFile::Texture(Container::Ktx2, self.format()?));
+        }
         let file = RadianceFile::of_extension(&self.file, self.format()?);
         file.ok_or_else(|| refused(format!("there are no {} files of light", self.file)))
     }
@@ -97,6 +127,22 @@ fn encoded(texture: &Texture, container: &str) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
+impl Prefiltered {
+    /// The files that the program writes into a folder.
+    fn archive(&self, state: &IblState) -> Result<Vec<u8>, Error> {
+        let (light, settings, sun) = (&self.light, &self.settings, self.sun.as_ref());
+        let (engine, texels) = (state.target()?, state.format()?);
+        let folder = IblFolder { light, settings, engine, texels, sun };
+        let mut archive = Archive::default();
+        for file in IblFile::all(light.levels.len()) {
+            let mut bytes = Vec::new();
+            folder.encode(file, &mut bytes).map_err(refused)?;
+            archive.add(&file.name(), &bytes)?;
+        }
+        Ok(archive.finish())
+    }
+}
+
 impl Engine {
     /// The engines, the languages of shaders and the usual number of texels of tables, as JSON.
     pub fn targets(&self) -> String {
@@ -105,38 +151,44 @@ impl Engine {
             let file = RadianceFile::of_extension(extension, TexelFormat::Half);
             File { extension, engine: file.and_then(RadianceFile::engine).map(Target::name) }
         };
+        let files = RadianceFile::EXTENSIONS.into_iter().chain([ARCHIVE]);
         to_json(&Offers {
             engines: Target::ALL.map(Target::name).into(),
-            files: RadianceFile::EXTENSIONS.map(file).into(),
+            files: files.map(file).collect(),
+            layouts: Layout::ALL.map(Layout::name).into(),
             languages: ShaderLanguage::ALL.map(language).into(),
             texels: TableSettings::default().texels,
         })
     }
 
-    /// Prefilters the map: `{"engine", "size", "texels", "file", "sun", "clamp"}`; it is kept until the map changes.
+    /// Prefilters the map: `{"engine", "layout", "size", "texels", "file", "sun", "clamp"}`; it is kept until the map changes.
     ///
     /// # Errors
     /// If there is no environment, it is black, or the settings are out of range.
     pub fn prefilter(&mut self, json: &str) -> Result<String, Error> {
-        if let Some((_, report, _)) = self.prefiltered.as_ref().filter(|(of, ..)| of == json) {
-            return Ok(report.clone());
+        if let Some(kept) = self.prefiltered.as_ref().filter(|kept| kept.of == json) {
+            return Ok(kept.report.clone());
         }
         let state: IblState = parse(json)?;
         let treated = state.treatment()?.apply(self.environment()?).map_err(refused)?;
-        let settings = IblSettings::for_engine(state.target()?, state.size);
+        let settings = state.settings()?;
+        let file = state.radiance_file()?;
+        file.check(settings.layout, settings.size).map_err(refused)?;
         let light = prefilter(&treated.environment, &settings).map_err(refused)?;
         let report = IblReport {
             levels: light.levels.len(),
-            loss: state.radiance_file()?.loss(&light).warning(),
+            loss: file.loss(&light).warning(),
             clamped: treated.clamped,
         };
         let report = to_json(&report);
-        self.prefiltered = Some((json.to_owned(), report.clone(), light));
+        let sun = treated.sun.and_then(|rig| rig.lights.into_iter().next());
+        let of = json.to_owned();
+        self.prefiltered = Some(Prefiltered { of, report: report.clone(), settings, sun, light });
         Ok(report)
     }
 
     /// A file of the light that was prefiltered with the settings in `json`: `radiance`, or as `ktx2` or `dds` `irradiance` or
-    /// `brdf`.
+    /// `brdf`. An archive holds all of them, pictures of the levels and a description.
     ///
     /// # Errors
     /// If something else was prefiltered, or there is no such file.
@@ -146,9 +198,11 @@ impl Engine {
             let table = BrdfTable::new(BrdfTable::SIZE, Target::terms(state.target()?));
             return encoded(&Texture::table(&table), &state.file);
         }
-        let kept = self.prefiltered.as_ref().filter(|(of, ..)| of == json);
-        let (_, _, light) = kept.ok_or_else(|| refused("this light was not prefiltered"))?;
+        let kept = self.prefiltered.as_ref().filter(|kept| kept.of == json);
+        let kept = kept.ok_or_else(|| refused("this light was not prefiltered"))?;
+        let light = &kept.light;
         match content {
+            "radiance" if state.file == ARCHIVE => kept.archive(&state),
             "radiance" => {
                 let mut bytes = Vec::new();
                 state.radiance_file()?.encode(light, &mut bytes).map_err(refused)?;
@@ -156,7 +210,7 @@ impl Engine {
             }
             "irradiance" => {
                 let irradiance = std::slice::from_ref(&light.irradiance);
-                encoded(&Texture::cube(irradiance, state.format()?).0, &state.file)
+                encoded(&Texture::light(irradiance, state.format()?).0, &state.file)
             }
             _ => Err(refused(format!("there is no texture {content}"))),
         }

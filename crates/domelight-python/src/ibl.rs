@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use domelight::picture::texture::{Container, EncodingLoss, RadianceFile, TexelFormat, Texture};
 use domelight::picture::write_atomically;
 use domelight::rig::ibl::{
-    self, BrdfTable, Cube, Engine, IblSettings, SunTreatment, prefilter as prefiltered,
+    self, BrdfTable, Engine, FilteredMap, IblSettings, Layout, SunTreatment,
+    prefilter as prefiltered,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -21,7 +22,7 @@ type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
 /// An environment filtered for an engine. Returned by `prefilter`.
 ///
 /// Cubes have their faces in the order +X, -X, +Y, -Y, +Z, -Z and in the orientation in which OpenGL, Vulkan, Direct3D,
-/// Metal and WebGPU look up a direction.
+/// Metal and WebGPU look up a direction. Octahedral maps have +Y at their center and texels of equal areas.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct PrefilteredLight {
     inner: ibl::PrefilteredLight,
@@ -31,9 +32,13 @@ pub(crate) struct PrefilteredLight {
     name: String,
 }
 
-fn cube<'py>(py: Python<'py>, cube: &Cube) -> PyResult<FloatArray<'py>> {
-    let texels = cube.texels.iter().map(|texel| texel.to_array()).collect();
-    rows(py, texels, &[6, cube.size, cube.size])
+fn texels<'py>(py: Python<'py>, map: &FilteredMap) -> PyResult<FloatArray<'py>> {
+    let FilteredMap { layout, size, ref texels } = *map;
+    let texels = texels.iter().map(|texel| texel.to_array()).collect();
+    match layout {
+        Layout::Cube => rows(py, texels, &[6, size, size]),
+        Layout::Octahedral => rows(py, texels, &[size, size]),
+    }
 }
 
 impl PrefilteredLight {
@@ -47,7 +52,7 @@ impl PrefilteredLight {
         let known = "its name must end in .ktx2, .dds, .ktx or .env";
         let file = RadianceFile::of_extension(&extension(path), texels)
             .ok_or_else(|| bad_value(format!("{}: {known}", path.display())))?;
-        file.check(self.settings.size).map_err(|e| from_source(&e))?;
+        file.check(self.settings.layout, self.settings.size).map_err(|e| from_source(&e))?;
         if let Some(engine) = file.engine().filter(|&engine| self.engine != Some(engine)) {
             let (path, name) = (path.display(), engine.name());
             let text = format!("{path}: such files are for {name}; prefilter with engine='{name}'");
@@ -70,7 +75,7 @@ impl PrefilteredLight {
         let (texture, loss) = match content {
             "irradiance" => {
                 let (texture, loss) =
-                    Texture::cube(std::slice::from_ref(&self.inner.irradiance), texels);
+                    Texture::light(std::slice::from_ref(&self.inner.irradiance), texels);
                 (texture, self.loss(loss))
             }
             "brdf" => {
@@ -99,9 +104,10 @@ fn texel_format(texels: &str) -> PyResult<TexelFormat> {
 #[pymethods]
 impl PrefilteredLight {
     /// list of ndarray, shape (6, S, S, 3): the radiance of each level, the first as a mirror shows it [W m^-2 sr^-1].
+    /// Octahedral maps have shape (S, S, 3).
     #[getter]
     fn levels<'py>(&self, py: Python<'py>) -> PyResult<Vec<FloatArray<'py>>> {
-        self.inner.levels.iter().map(|level| cube(py, level)).collect()
+        self.inner.levels.iter().map(|level| texels(py, level)).collect()
     }
 
     /// list of float: the perceptual roughness of each level, in [0, 1].
@@ -111,13 +117,13 @@ impl PrefilteredLight {
     }
 
     /// ndarray, shape (6, S, S, 3): irradiance over pi, the radiance of a white diffuse surface [W m^-2 sr^-1]. S is 32, or
-    /// less if the cube is smaller.
+    /// less if the first level is smaller. Octahedral maps have shape (S, S, 3).
     #[getter]
     fn irradiance<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
-        cube(py, &self.inner.irradiance)
+        texels(py, &self.inner.irradiance)
     }
 
-    /// ndarray, shape (9, 3): the radiance's real spherical harmonics up to degree 2, in the frame of the cubes.
+    /// ndarray, shape (9, 3): the radiance's real spherical harmonics up to degree 2, in the frame of the maps.
     #[getter]
     fn harmonics<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
         let coefficients = self.inner.harmonics.coefficients;
@@ -136,7 +142,13 @@ impl PrefilteredLight {
         self.sun.clone()
     }
 
-    /// ndarray, shape (3, 3): the world directions that the cubes show at +X, +Y and +Z.
+    /// str: how the texels cover the sphere, 'cube' or 'octahedral'.
+    #[getter]
+    fn layout(&self) -> &'static str {
+        self.settings.layout.name()
+    }
+
+    /// ndarray, shape (3, 3): the world directions that the maps show at +X, +Y and +Z.
     #[getter]
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
         rows(py, self.settings.axes.world.map(|axis| axis.to_array()).to_vec(), &[3])
@@ -165,7 +177,7 @@ impl PrefilteredLight {
         array(py, table.texels.into_flattened(), &[size, size, 2])
     }
 
-    /// Write a cube or the table of the BRDF as a texture, as `domelight ibl` does.
+    /// Write a map or the table of the BRDF as a texture, as `domelight ibl` does.
     ///
     /// Parameters
     /// ----------
@@ -175,7 +187,7 @@ impl PrefilteredLight {
     /// content : {'radiance', 'irradiance', 'brdf'}, default 'radiance'
     ///     All levels, irradiance over pi, or the table of the BRDF.
     /// texels : {'rgb9e5', 'half'}, default 'rgb9e5'
-    ///     The format of a cube's texels, 4 or 8 bytes.
+    ///     The format of a map's texels, 4 or 8 bytes.
     ///
     /// Raises
     /// ------
@@ -207,13 +219,15 @@ impl PrefilteredLight {
 /// env : Environment
 ///     The light.
 /// size : int, default 256
-///     Columns of a face of the first level, from 1 to 4096. Each level halves them.
-/// engine : {'three', 'filament', 'babylon', 'godot', 'bevy', 'unreal'}, optional
-///     Decides how the cubes stand, the roughness of each level and the terms of the table. By default, cubes are looked up with
+///     Columns of a face of the first level, from 1 to 4096. Each level halves them. An octahedral map is a single face.
+/// engine : {'three', 'filament', 'babylon', 'godot', 'bevy', 'unreal', 'playcanvas'}, optional
+///     Decides how the maps stand, the roughness of each level and the terms of the table. By default, maps are looked up with
 ///     the world direction, and the roughness is level / (levels - 1).
 /// sun : str, default 'keep'
 ///     'keep', 'remove' or 'clamp:X'. A sun that is removed is `PrefilteredLight.sun`, for an engine that lights the scene by
 ///     it. 'clamp:100' scales every texel until its brightest channel is at most 100.
+/// layout : {'cube', 'octahedral'}, default 'cube'
+///     Six faces, or one square of equal areas with +Y at its center.
 /// sh_window : bool, default True
 ///     Remove the rings of the harmonics by a window where their irradiance would be negative, opposite to small bright lights.
 /// threads : int, optional
@@ -222,27 +236,32 @@ impl PrefilteredLight {
 /// Returns
 /// -------
 /// PrefilteredLight
-///     Cubes, harmonics and table, as arrays and files.
+///     Maps, harmonics and table, as arrays and files.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     If the map is black or has no sun to remove, the size is out of range, or the engine is unknown.
+///     If the map is black or has no sun to remove, the size is out of range, or the engine or the layout is unknown.
 #[pyfunction]
-#[pyo3(signature = (env, size = 256, *, engine = None, sun = "keep", sh_window = true, threads = None),
-    text_signature = "(env, size=256, *, engine=None, sun='keep', sh_window=True, threads=None)")]
+#[pyo3(signature = (env, size = 256, *, engine = None, sun = "keep", layout = "cube", sh_window = true, threads = None),
+    text_signature = "(env, size=256, *, engine=None, sun='keep', layout='cube', sh_window=True, threads=None)")]
 pub(crate) fn prefilter(
     env: &Bound<'_, Environment>,
     size: usize,
     engine: Option<&str>,
     sun: &str,
+    layout: &str,
     sh_window: bool,
     threads: Option<usize>,
 ) -> PyResult<PrefilteredLight> {
     let engine: Option<Engine> = engine.map(str::parse).transpose().map_err(|e| from_source(&e))?;
     let sun: SunTreatment = sun.parse().map_err(|e| from_source(&e))?;
-    let settings =
-        IblSettings { harmonics_window: sh_window, ..IblSettings::for_engine(engine, size) };
+    let layout: Layout = layout.parse().map_err(|e| from_source(&e))?;
+    let settings = IblSettings {
+        layout,
+        harmonics_window: sh_window,
+        ..IblSettings::for_engine(engine, size)
+    };
     let Environment { inner, name } = env.get();
     let (inner, clamped, sun) = parallel_on(env.py(), threads, || {
         let treated = sun.apply(inner).map_err(|e| from_source(&e))?;

@@ -36,6 +36,20 @@ def test_a_white_map_stays_white():
     assert light.brdf(8).shape == (8, 8, 2)
 
 
+def test_octahedral_maps_are_squares(env, tmp_path: pathlib.Path):
+    light = dl.prefilter(env, 16, layout="octahedral")
+    assert light.layout == "octahedral"
+    assert [level.shape for level in light.levels] == [(n, n, 3) for n in (16, 8, 4, 2, 1)]
+    # Texels have equal areas.
+    mean = (env.solid_angles[:, None, None] * env.map).sum(axis=(0, 1)) / (4 * np.pi)
+    np.testing.assert_allclose(light.levels[0].mean(axis=(0, 1)), mean, rtol=1e-4)
+    light.save(tmp_path / "light.dds")
+    with pytest.raises(ValueError, match="reads cubes alone"):
+        dl.prefilter(env, 16, engine="babylon", layout="octahedral").save(tmp_path / "light.env")
+    with pytest.raises(ValueError, match="unknown layout"):
+        dl.prefilter(env, 4, layout="disc")  # type: ignore[arg-type]
+
+
 def test_files_are_those_of_the_arrays(env, tmp_path: pathlib.Path):
     light = dl.prefilter(env, 8)
     for name, texels, rtol in [("light.ktx2", "half", 1e-3), ("light.dds", "rgb9e5", 4e-3)]:

@@ -13,7 +13,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, load_probe};
 use domelight::environment::{Environment, Orientation};
 use domelight::math::{Frame, Vec3, vec3};
-use domelight::rig::ibl::{Cube, IblSettings, PrefilteredLight, prefilter};
+use domelight::rig::ibl::{FilteredMap, IblSettings, Layout, PrefilteredLight, prefilter};
 use domelight::sampling::Pcg32;
 use domelight::{Rgb, RgbImage};
 use rayon::prelude::*;
@@ -56,11 +56,11 @@ fn distribution(cos_h: f32, alpha: f32) -> f32 {
 /// Křivánek & Colbert 2008, "Real-time Shading with Filtered Importance Sampling", as Filament's `cmgen` applies it: samples of
 /// the lobe look up a level of the unfiltered cube whose texels have four times the solid angle of a sample.
 struct FilteredSampling {
-    levels: Vec<Cube>,
+    levels: Vec<FilteredMap>,
 }
 
 impl FilteredSampling {
-    fn new(mirror: &Cube) -> Self {
+    fn new(mirror: &FilteredMap) -> Self {
         let mut levels = vec![mirror.clone()];
         while let Some(finer) = levels.last().filter(|cube| cube.size > 1) {
             levels.push(halved(finer));
@@ -68,18 +68,15 @@ impl FilteredSampling {
         Self { levels }
     }
 
-    fn prefilter(&self) -> Vec<Cube> {
+    fn prefilter(&self) -> Vec<FilteredMap> {
         let level = |(level, &roughness): (usize, &f32)| {
             let size = SIZE >> level;
             if level == 0 {
                 return self.levels[0].clone();
             }
-            let texel = |i: usize| {
-                let within = i % (size * size);
-                let n = Cube::direction(size, i / (size * size), within % size, within / size);
-                self.filter(n, roughness * roughness)
-            };
-            Cube { size, texels: (0..6 * size * size).into_par_iter().map(texel).collect() }
+            let texel =
+                |i: usize| self.filter(Layout::Cube.direction(size, i), roughness * roughness);
+            cube(size, (0..6 * size * size).into_par_iter().map(texel).collect())
         };
         settings().roughness.iter().enumerate().map(level).collect()
     }
@@ -115,17 +112,21 @@ impl FilteredSampling {
 }
 
 /// The mean of each four texels.
-fn halved(cube: &Cube) -> Cube {
-    let (n, size) = (cube.size, cube.size / 2);
+fn halved(finer: &FilteredMap) -> FilteredMap {
+    let (n, size) = (finer.size, finer.size / 2);
     let texel = |i: usize| {
         let (face, x, y) = (i / (size * size), i % size, i / size % size);
-        let at = |dx: usize, dy: usize| cube.face(face)[(2 * y + dy) * n + 2 * x + dx];
+        let at = |dx: usize, dy: usize| finer.face(face)[(2 * y + dy) * n + 2 * x + dx];
         (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1)) * 0.25
     };
-    Cube { size, texels: (0..6 * size * size).map(texel).collect() }
+    cube(size, (0..6 * size * size).map(texel).collect())
 }
 
-fn bilinear(cube: &Cube, d: Vec3) -> Rgb {
+fn cube(size: usize, texels: Vec<Rgb>) -> FilteredMap {
+    FilteredMap { layout: Layout::Cube, size, texels }
+}
+
+fn bilinear(cube: &FilteredMap, d: Vec3) -> Rgb {
     let a = d.abs();
     // Vulkan 1.3, table "Cube Map Face Selection".
     let (face, s, t, major) = if a.x >= a.y && a.x >= a.z {
@@ -169,8 +170,8 @@ fn exact(env: &Environment, n: Vec3, alpha: f32) -> Rgb {
 }
 
 /// The errors of levels 1 and higher: root mean square and largest.
-fn errors(env: &Environment, levels: &[Cube]) -> Vec<[f32; 2]> {
-    let of = |(level, cube): (usize, &Cube)| {
+fn errors(env: &Environment, levels: &[FilteredMap]) -> Vec<[f32; 2]> {
+    let of = |(level, cube): (usize, &FilteredMap)| {
         let alpha = settings().roughness[level].powi(2);
         let mut pcg = Pcg32::new(level as u64, 1);
         let picks: Vec<usize> =
@@ -178,8 +179,7 @@ fn errors(env: &Environment, levels: &[Cube]) -> Vec<[f32; 2]> {
         let mean =
             cube.texels.iter().map(|t| t.luminance()).sum::<f32>() / cube.texels.len() as f32;
         let off = picks.par_iter().map(|&i| {
-            let n = cube.size * cube.size;
-            let d = Cube::direction(cube.size, i / n, i % n % cube.size, i % n / cube.size);
+            let d = cube.layout.direction(cube.size, i);
             (cube.texels[i].luminance() - exact(env, d, alpha).luminance()).abs() / mean
         });
         let off: Vec<f32> = off.collect();

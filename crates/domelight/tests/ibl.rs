@@ -4,7 +4,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::Vec3;
 use domelight::rig::ibl::{
-    Cube, CubeAxes, Engine, IblError, IblSettings, PrefilteredLight, prefilter,
+    CubeAxes, Engine, FilteredMap, IblError, IblSettings, Layout, PrefilteredLight, prefilter,
 };
 use domelight::{Rgb, RgbImage};
 use std::f64::consts::{PI, TAU};
@@ -114,10 +114,8 @@ fn worst_error(environment: &Environment, settings: &IblSettings, cells: usize) 
     worst
 }
 
-fn normal(cube: &Cube, i: usize, axes: CubeAxes) -> Vec3 {
-    let (face, within) = (i / (cube.size * cube.size), i % (cube.size * cube.size));
-    let direction = Cube::direction(cube.size, face, within % cube.size, within / cube.size);
-    axes.to_world(direction)
+fn normal(map: &FilteredMap, i: usize, axes: CubeAxes) -> Vec3 {
+    axes.to_world(map.layout.direction(map.size, i))
 }
 
 /// A map that is black but for one texel.
@@ -131,14 +129,20 @@ fn small(size: usize) -> IblSettings {
     IblSettings { irradiance_size: 8, ..IblSettings::linear(size) }
 }
 
+fn octahedral(size: usize) -> IblSettings {
+    IblSettings { layout: Layout::Octahedral, ..small(size) }
+}
+
 const TOLERANCE: f64 = 0.005;
 
 #[test]
 fn a_sun_of_one_texel_leaves_neither_fireflies_nor_rings() {
     for at in [[40, 11], [0, 31], [63, 0], [20, 15]] {
         let alone = one_texel(64, 32, at, 0.0);
-        let error = worst_error(&alone, &small(16), 1);
-        assert!(error < TOLERANCE, "{at:?}: {error}");
+        for settings in [small(16), octahedral(32)] {
+            let error = worst_error(&alone, &settings, 1);
+            assert!(error < TOLERANCE, "{:?} {at:?}: {error}", settings.layout);
+        }
     }
     // A texel of 0.7°, and a lobe of 3.5°.
     let tiny = one_texel(512, 256, [150, 70], 0.0);
@@ -166,8 +170,10 @@ fn a_checker_is_right() {
 fn builtin_probes_are_right() {
     for probe in [BuiltinProbe::Sky, BuiltinProbe::Studio, BuiltinProbe::Cathedral] {
         let environment = Environment::from_image(probe.image(32)).unwrap();
-        let error = worst_error(&environment, &small(16), 1);
-        assert!(error < TOLERANCE, "{}: {error}", probe.name());
+        for settings in [small(16), octahedral(32)] {
+            let error = worst_error(&environment, &settings, 1);
+            assert!(error < TOLERANCE, "{} {:?}: {error}", probe.name(), settings.layout);
+        }
     }
 }
 
@@ -183,12 +189,11 @@ fn maps_of_any_shape_and_orientation_are_right() {
         ] {
             let environment = Environment::new(map.clone(), orientation, 2.0).unwrap();
             let axes = Engine::Three.axes();
-            let error = worst_error(
-                &environment,
-                &IblSettings { axes, irradiance_size: 4, ..small(8) },
-                16,
-            );
-            assert!(error < TOLERANCE, "{width}x{height} {orientation:?}: {error}");
+            for settings in [small(8), octahedral(8)] {
+                let settings = IblSettings { axes, irradiance_size: 4, ..settings };
+                let error = worst_error(&environment, &settings, 16);
+                assert!(error < TOLERANCE, "{width}x{height} {orientation:?}: {error}");
+            }
         }
     }
 }
@@ -198,32 +203,36 @@ fn a_white_furnace_is_white() {
     for (width, height) in [(1, 1), (2, 1), (64, 32), (37, 11)] {
         let map = RgbImage::filled(width, height, Rgb::WHITE);
         let environment = Environment::from_image(map).unwrap();
-        let light = prefilter(&environment, &small(16)).unwrap();
-        for cube in light.levels.iter().chain([&light.irradiance]) {
-            for texel in &cube.texels {
-                let error = (*texel - Rgb::WHITE).map(f32::abs).max_component();
-                assert!(error < 0.002, "{width}x{height} at {}: {texel:?}", cube.size);
+        for settings in [small(16), octahedral(16), octahedral(15)] {
+            let light = prefilter(&environment, &settings).unwrap();
+            for map in light.levels.iter().chain([&light.irradiance]) {
+                for texel in &map.texels {
+                    let error = (*texel - Rgb::WHITE).map(f32::abs).max_component();
+                    assert!(error < 0.002, "{width}x{height} at {}: {texel:?}", map.size);
+                }
             }
         }
     }
 }
 
-/// The solid angle of a texel of a cube's face.
-fn solid_angle(size: usize, x: usize, y: usize) -> f64 {
+/// The solid angle of a texel.
+fn solid_angle(layout: Layout, size: usize, i: usize) -> f64 {
+    if layout == Layout::Octahedral {
+        return 4.0 * PI / (size * size) as f64;
+    }
+    let (x, y) = (i % size, i / size % size);
     let edge = |i: usize| 2.0 * i as f64 / size as f64 - 1.0;
     let corner = |s: f64, t: f64| (s * t).atan2((s * s + t * t + 1.0).sqrt());
     let (s0, s1, t0, t1) = (edge(x), edge(x + 1), edge(y), edge(y + 1));
     corner(s1, t1) - corner(s0, t1) - corner(s1, t0) + corner(s0, t0)
 }
 
-/// ∫ L ω dω and ∫ L dω of a cube, in the world.
-fn moments(cube: &Cube, axes: CubeAxes) -> ([f64; 3], f64) {
+/// ∫ L ω dω and ∫ L dω of a map, in the world.
+fn moments(map: &FilteredMap, axes: CubeAxes) -> ([f64; 3], f64) {
     let (mut moment, mut energy) = ([0.0; 3], 0.0);
-    for (i, texel) in cube.texels.iter().enumerate() {
-        let within = i % (cube.size * cube.size);
-        let flux =
-            f64::from(texel.g) * solid_angle(cube.size, within % cube.size, within / cube.size);
-        let d = normal(cube, i, axes).to_array();
+    for (i, texel) in map.texels.iter().enumerate() {
+        let flux = f64::from(texel.g) * solid_angle(map.layout, map.size, i);
+        let d = normal(map, i, axes).to_array();
         (0..3).for_each(|k| moment[k] += flux * f64::from(d[k]));
         energy += flux;
     }
@@ -242,10 +251,12 @@ fn the_sun_stands_where_the_engine_looks_for_it() {
     ] {
         let environment = Environment::new(map.clone(), orientation, 1.0).unwrap();
         let sun = environment.direction(domelight::math::vec2(37.5 / 64.0, 10.5 / 32.0));
-        for axes in Engine::ALL.map(Engine::axes).into_iter().chain([CubeAxes::WORLD]) {
+        let all = Engine::ALL.map(Engine::axes).into_iter().chain([CubeAxes::WORLD]);
+        let all =
+            all.flat_map(|axes| [small(32), octahedral(64), octahedral(63)].map(|s| (axes, s)));
+        for (axes, settings) in all {
             let roughness = vec![0.0, 0.3];
-            let settings =
-                IblSettings { axes, roughness, irradiance_size: 1, ..IblSettings::linear(32) };
+            let settings = IblSettings { axes, roughness, irradiance_size: 1, ..settings };
             let PrefilteredLight { levels, .. } = prefilter(&environment, &settings).unwrap();
             let (moment, energy) = moments(&levels[0], axes);
             assert!((energy / environment.power() - 1.0).abs() < 1e-4, "{energy}");
@@ -263,6 +274,41 @@ fn the_sun_stands_where_the_engine_looks_for_it() {
             }
         }
     }
+}
+
+/// Neighbors at an edge of an octahedral map differ no more than those within it, and the last level is a single texel.
+#[test]
+fn octahedral_maps_have_no_seams() {
+    let environment = Environment::from_image(BuiltinProbe::Cathedral.image(64)).unwrap();
+    let light = prefilter(&environment, &octahedral(32)).unwrap();
+    assert_eq!(light.levels.iter().map(|map| map.size).collect::<Vec<_>>(), [32, 16, 8, 4, 2, 1]);
+    for map in &light.levels[1..5] {
+        let (size, last) = (map.size, map.size - 1);
+        let difference = |a: [usize; 2], b: [usize; 2]| {
+            let [a, b] = [a, b].map(|[x, y]| map.texels[y * size + x]);
+            (a - b).map(f32::abs).max_component()
+        };
+        let indices = (0..size).flat_map(|y| (0..last).map(move |x| (x, y)));
+        let within = indices
+            .map(|(x, y)| difference([x, y], [x + 1, y]).max(difference([y, x], [y, x + 1])));
+        let within = within.fold(0.0, f32::max);
+        for i in 0..size {
+            for [at, beyond] in [
+                [[0, i], [0, last - i]],
+                [[last, i], [last, last - i]],
+                [[i, 0], [last - i, 0]],
+                [[i, last], [last - i, last]],
+            ] {
+                let across = difference(at, beyond);
+                // The texels of level 4 are as wide as a quarter of the sphere.
+                assert!(across <= 1.2 * within, "{size} {at:?}: {across} {within}");
+            }
+        }
+    }
+    let mean = environment.power() / (4.0 * PI);
+    let single =
+        f64::from(light.levels[0].texels.iter().map(|t| t.luminance()).sum::<f32>()) / 1024.0;
+    assert!((single / mean - 1.0).abs() < 1e-4, "{single} {mean}");
 }
 
 /// Irradiance of the nine coefficients beside the exact one: Ramamoorthi & Hanrahan 2001 prove an average error of at

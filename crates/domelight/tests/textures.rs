@@ -2,7 +2,7 @@
 
 use domelight::environment::Environment;
 use domelight::picture::texture::{TexelFormat, Texture, dds, ktx2};
-use domelight::rig::ibl::{BrdfTable, Cube, TableTerms};
+use domelight::rig::ibl::{BrdfTable, FilteredMap, Layout, TableTerms};
 use domelight::rig::tables::{ShaderTables, TableSettings};
 use domelight::{Rgb, RgbImage};
 
@@ -125,16 +125,16 @@ fn read_dds(file: &[u8], texel: usize) -> Read {
 }
 
 /// A chain of levels in which every texel is another color, a power of two in each channel.
-fn levels(size: usize) -> Vec<Cube> {
-    let cube = |level: usize| {
+fn levels(layout: Layout, size: usize) -> Vec<FilteredMap> {
+    let map = |level: usize| {
         let size = (size >> level).max(1);
         let color = |i: usize| {
             let power = |k: usize| 2f32.powi(((i + k) % 7) as i32 - 3 + level as i32);
             Rgb::new(power(0), power(1), power(2))
         };
-        Cube { size, texels: (0..6 * size * size).map(color).collect() }
+        FilteredMap { layout, size, texels: (0..layout.texels(size)).map(color).collect() }
     };
-    (0..=size.ilog2() as usize).map(cube).collect()
+    (0..=size.ilog2() as usize).map(map).collect()
 }
 
 fn half(bytes: &[u8]) -> f32 {
@@ -157,11 +157,11 @@ fn decode(format: TexelFormat, bytes: &[u8]) -> [f32; 3] {
 }
 
 #[test]
-fn cubes_are_read_back() {
+fn cubes_and_octahedral_maps_are_read_back() {
     for format in [TexelFormat::SharedExponent, TexelFormat::Half] {
-        for size in [1, 2, 6, 16] {
-            let cubes = levels(size);
-            let (texture, clipped) = Texture::cube(&cubes, format);
+        for (layout, size) in Layout::ALL.into_iter().flat_map(|l| [1, 2, 6, 16].map(|s| (l, s))) {
+            let maps = levels(layout, size);
+            let (texture, clipped) = Texture::light(&maps, format);
             assert_eq!(clipped.texels, 0);
             let (mut ktx, mut direct) = (Vec::new(), Vec::new());
             ktx2::encode(&texture, &mut ktx).unwrap();
@@ -173,12 +173,12 @@ fn cubes_are_read_back() {
                 TexelFormat::Half | TexelFormat::HalfPair | TexelFormat::Single => (97, 10),
             };
             assert_eq!((from_ktx.format, from_dds.format), numbers);
-            assert_eq!((from_ktx.size, from_ktx.faces), ([size; 2], 6));
+            assert_eq!((from_ktx.size, from_ktx.faces), ([size; 2], layout.faces()));
             assert_eq!(from_ktx.levels, from_dds.levels);
-            for (cube, faces) in cubes.iter().zip(&from_ktx.levels) {
+            for (map, faces) in maps.iter().zip(&from_ktx.levels) {
                 for (face, bytes) in faces.iter().enumerate() {
                     let texels = bytes.chunks(format.bytes()).map(|t| decode(format, t));
-                    assert!(texels.eq(cube.face(face).iter().map(|t| t.to_array())));
+                    assert!(texels.eq(map.face(face).iter().map(|t| t.to_array())));
                 }
             }
         }

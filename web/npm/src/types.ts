@@ -21,7 +21,7 @@ export interface BuiltinScene {
 
 /** A program, for how it orients a lat-long map. */
 export type Convention =
-  "blender" | "mitsuba" | "pbrt" | "usd" | "gltf" | "three" | "babylon" | "unreal" | "unity" | "godot" | "bevy" | "filament" | "radiance" | "nvdiffrec";
+  "blender" | "mitsuba" | "pbrt" | "usd" | "gltf" | "three" | "babylon" | "unreal" | "unity" | "godot" | "bevy" | "filament" | "playcanvas" | "radiance" | "nvdiffrec";
 
 /** The options of `load`. */
 export interface LoadOptions {
@@ -130,14 +130,16 @@ export interface SphericalGaussians {
 }
 
 /** An engine that prefiltered light is made for. */
-export type Engine = "three" | "filament" | "babylon" | "godot" | "bevy" | "unreal";
+export type Engine = "three" | "filament" | "babylon" | "godot" | "bevy" | "unreal" | "playcanvas";
 
 /** The options of `ibl`. */
 export interface IblOptions {
+  /** How texels cover the sphere: six faces, or one square of equal areas with +Y at its center. Default: `"cube"`. */
+  layout?: "cube" | "octahedral";
   /** Columns of a face in the first level, in [1, 4096]. Default: 256. */
   size?: number;
   /**
-   * The engine, which decides how the cube stands, the roughness of each level and the terms of the table. Default: the cube is
+   * The engine, which decides how the map stands, the roughness of each level and the terms of the table. Default: the map is
    * looked up with the world direction, and roughness is level / (levels − 1).
    */
   for?: Engine;

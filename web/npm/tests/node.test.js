@@ -122,6 +122,9 @@ for (const worker of [true, false]) describe(worker ? "in a Worker" : "in this t
     assert.deepEqual(warnings, []);
     const clamped = await ibl(map, { size: 8, sun: "clamp:10", container: "dds", texels: "half" });
     assert.equal(Buffer.from(clamped.radiance.slice(0, 4)).toString(), "DDS ");
+    const square = await ibl(map, { size: 16, layout: "octahedral" });
+    // The number of faces.
+    assert.equal(square.radiance[36], 1);
     assert.match(clamped.warnings.join(), /^sunny\.pfm: clamped, -\d+\.\d\d % light$/);
     assert.match((await ibl(await load(even(1)), { size: 4, sun: "remove" })).warnings.join(), /there is no sun.*; nothing is removed$/);
   });
@@ -181,6 +184,7 @@ for (const worker of [true, false]) describe(worker ? "in a Worker" : "in this t
       [() => sg(map, { k: 4 }), /^sg: option k: /],
       [() => ibl(map, { size: 0 }), /^ibl: option size: 0 is not in \[1, 4096\]/],
       [() => ibl(map, { for: "maya" }), /^ibl: option for: unknown engine "maya"; known are three/],
+      [() => ibl(map, { layout: "disc" }), /^ibl: option layout: unknown layout "disc"; known are cube, octahedral/],
       [() => ibl(map, { sun: "eat" }), /^ibl: option sun: "eat" is not keep, remove or clamp:X/],
       [() => render(new Uint8Array(9), map), /^scene\.glb/],
       [() => render({ builtin: "sphere" }, map, { width: 0 }), /^render: option width: 0 is not in \[1, 8192\]/],

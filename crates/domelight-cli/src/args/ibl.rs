@@ -6,8 +6,8 @@ use std::str::FromStr;
 
 use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
-use domelight::picture::texture::{Container, RadianceFile, TexelFormat};
-use domelight::rig::ibl::{Engine, IblSettings, SunTreatment};
+use domelight::picture::texture::{Container, RadianceFile, RadianceFileError, TexelFormat};
+use domelight::rig::ibl::{Engine, IblSettings, Layout, SunTreatment};
 
 use super::one_of;
 use crate::error::UsageError;
@@ -23,6 +23,8 @@ Examples:
       the same as DDS in half precision, and the cube of diffuse light
   domelight ibl studio.hdr -o studio.env
       one file for Babylon.js; studio.ktx is one for Filament
+  domelight ibl studio.hdr -o studio.ktx2 --layout octahedral --size 512
+      one square per level instead of six faces, for shaders of your own
   domelight ibl road.hdr -o road/ --sun remove
       a folder with everything, without the sun, which becomes a light of its own: domelight lights --sun";
 
@@ -32,12 +34,12 @@ pub(crate) struct IblArguments {
     #[command(flatten)]
     pub(crate) light: Light,
 
-    /// Output: .ktx2 or .dds, a cube with a level for each roughness; .ktx for Filament or .env for Babylon.js, the same with
-    /// the irradiance; or a folder, whose name ends in /, for the cube, the irradiance, the table and OpenEXR pictures of all
+    /// Output: .ktx2 or .dds, a map with a level for each roughness; .ktx for Filament or .env for Babylon.js, the same with
+    /// the irradiance; or a folder, whose name ends in /, for the map, the irradiance, the table and OpenEXR pictures of all
     /// levels
     #[arg(short, long, value_name = "OUT", help_heading = "Output")]
     pub(crate) output: IblPath,
-    /// Write the irradiance over π as a cube (.ktx2, .dds)
+    /// Write the irradiance over π as a map of its own (.ktx2, .dds)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(crate) irradiance: Option<TexturePath>,
     /// Write the table of the BRDF, the second factor of the split sum (.ktx2, .dds)
@@ -47,11 +49,15 @@ pub(crate) struct IblArguments {
     #[arg(long, help_heading = "Output")]
     pub(crate) json: bool,
 
-    /// Columns of a face in the first level
+    /// How the texels of all maps cover the sphere
+    #[arg(long, default_value = Layout::default().name(), help_heading = "Prefiltered light",
+          value_parser = layout())]
+    pub(crate) layout: Layout,
+    /// Columns of a face in the first level; an octahedral map is a single face
     #[arg(long, value_name = "N", default_value_t = 256, help_heading = "Prefiltered light",
           value_parser = clap::value_parser!(u32).range(1..=IblSettings::MAX_SIZE as i64))]
     pub(crate) size: u32,
-    /// The engine, which decides how the cube stands, the roughness of each level and the terms of the table [default:
+    /// The engine, which decides how the map stands, the roughness of each level and the terms of the table [default:
     /// looked up with the world direction, roughness = level / (levels - 1)]
     #[arg(long = "for", id = "engine", value_name = "ENGINE", help_heading = "Prefiltered light",
           value_parser = engine())]
@@ -77,6 +83,14 @@ pub(super) fn engine() -> impl TypedValueParser<Value = Engine> {
     one_of(Engine::ALL.map(Engine::name))
 }
 
+fn layout() -> impl TypedValueParser<Value = Layout> {
+    let help = |layout| match layout {
+        Layout::Cube => "six square faces",
+        Layout::Octahedral => "one square, of equal areas and with +Y at its center",
+    };
+    one_of(Layout::ALL.map(|layout| PossibleValue::new(layout.name()).help(help(layout))))
+}
+
 const TEXELS: TexelFormat = TexelFormat::SharedExponent;
 
 fn texels() -> impl TypedValueParser<Value = TexelFormat> {
@@ -84,7 +98,7 @@ fn texels() -> impl TypedValueParser<Value = TexelFormat> {
         "4 bytes: mantissas of 9 bits with a common exponent, up to 65408",
         "8 bytes: RGBA in half precision, up to 65504",
     ];
-    let names = TexelFormat::CUBES.map(TexelFormat::name).into_iter();
+    let names = TexelFormat::LIGHT.map(TexelFormat::name).into_iter();
     one_of(names.zip(help).map(|(name, help)| PossibleValue::new(name).help(help)))
 }
 
@@ -132,7 +146,7 @@ fn extension(path: &Path) -> Option<Cow<'_, str>> {
 }
 
 impl IblArguments {
-    /// The format of the texels of cubes.
+    /// The format of the texels of maps.
     pub(crate) fn texel_format(&self) -> TexelFormat {
         self.texels.unwrap_or(TEXELS)
     }
@@ -151,7 +165,13 @@ impl IblArguments {
     /// The engine that the files are for, which the format of the radiance may decide.
     pub(crate) fn target(&self) -> Result<Option<Engine>, UsageError> {
         let file = self.radiance_file();
-        file.check(self.size as usize).map_err(|error| UsageError(format!("--size: {error}")))?;
+        file.check(self.layout, self.size as usize).map_err(|error| {
+            let option = match error {
+                RadianceFileError::Size { .. } => "--size",
+                RadianceFileError::Layout { .. } => "--layout",
+            };
+            UsageError(format!("{option}: {error}"))
+        })?;
         let Some(only) = file.engine() else { return Ok(self.engine) };
         match self.engine {
             Some(other) if other != only => {

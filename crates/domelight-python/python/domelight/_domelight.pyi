@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._camera import Camera
-from ._names import Content, Curve, Engine, Ground, Layer, ShaderLanguage, Texels, Up, Window
+from ._names import Content, Curve, Engine, Ground, Layer, Layout, ShaderLanguage, Texels, Up, Window
 from ._options import PictureOptions, RenderOptions
 from .metrics import Comparison
 from .strategies import Strategy
@@ -266,6 +266,8 @@ class ShadingPoints:
 @final
 class PrefilteredLight:
     @property
+    def layout(self) -> Layout: ...
+    @property
     def levels(self) -> list[_Floats]: ...
     @property
     def roughness(self) -> list[float]: ...
@@ -369,6 +371,7 @@ def prefilter(
     *,
     engine: Engine | None = None,
     sun: str = "keep",
+    layout: Layout = "cube",
     sh_window: bool = True,
     threads: int | None = None,
 ) -> PrefilteredLight: ...

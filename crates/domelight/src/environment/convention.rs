@@ -37,6 +37,8 @@ pub enum Convention {
     Bevy,
     /// Filament's `cmgen`.
     Filament,
+    /// PlayCanvas' textures in its projection equirect.
+    PlayCanvas,
     /// A Radiance source with a lat-long picture, as domelight writes it.
     Radiance,
     /// nvdiffrec and nvdiffrecmc.
@@ -77,7 +79,7 @@ pub struct Indivisible {
 
 impl Convention {
     /// All programs.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Blender,
         Self::Mitsuba,
         Self::Pbrt,
@@ -90,6 +92,7 @@ impl Convention {
         Self::Godot,
         Self::Bevy,
         Self::Filament,
+        Self::PlayCanvas,
         Self::Radiance,
         Self::Nvdiffrec,
     ];
@@ -109,6 +112,7 @@ impl Convention {
             Self::Godot => "godot",
             Self::Bevy => "bevy",
             Self::Filament => "filament",
+            Self::PlayCanvas => "playcanvas",
             Self::Radiance => "radiance",
             Self::Nvdiffrec => "nvdiffrec",
         }
@@ -125,7 +129,12 @@ impl Convention {
         match self {
             Self::Unreal | Self::Bevy | Self::Radiance | Self::Nvdiffrec => 0,
             Self::Pbrt | Self::Unity => 1,
-            Self::Mitsuba | Self::Usd | Self::Babylon | Self::Godot | Self::Filament => 2,
+            Self::Mitsuba
+            | Self::Usd
+            | Self::Babylon
+            | Self::Godot
+            | Self::Filament
+            | Self::PlayCanvas => 2,
             Self::Blender | Self::Gltf | Self::Three => 3,
         }
     }
@@ -145,6 +154,7 @@ impl Convention {
             | Self::Godot
             | Self::Bevy
             | Self::Filament
+            | Self::PlayCanvas
             | Self::Radiance
             | Self::Nvdiffrec => false,
         }
@@ -155,7 +165,9 @@ impl Convention {
     pub fn look_up(self) -> &'static str {
         match self {
             Self::Blender => "½ − atan2(y, x)/2π, z up",
-            Self::Mitsuba | Self::Godot | Self::Filament => "atan2(x, −z)/2π, y up",
+            Self::Mitsuba | Self::Godot | Self::Filament | Self::PlayCanvas => {
+                "atan2(x, −z)/2π, y up"
+            }
             Self::Pbrt => "atan2(y, x)/2π, z up",
             Self::Usd => "¼ + atan2(z, x)/2π, y up",
             Self::Gltf | Self::Three => "½ + atan2(z, x)/2π, y up",
@@ -171,7 +183,12 @@ impl Convention {
     pub fn center(self) -> &'static str {
         match self {
             Self::Blender | Self::Gltf | Self::Three | Self::Unity => "+X",
-            Self::Mitsuba | Self::Usd | Self::Babylon | Self::Godot | Self::Filament => "+Z",
+            Self::Mitsuba
+            | Self::Usd
+            | Self::Babylon
+            | Self::Godot
+            | Self::Filament
+            | Self::PlayCanvas => "+Z",
             Self::Pbrt => "−X",
             Self::Radiance => "+Y",
             Self::Unreal => "−Y",
@@ -194,6 +211,7 @@ impl Convention {
             Self::Godot => "sky.glsl",
             Self::Bevy => "environment_map.wgsl looks cubes up with −z",
             Self::Filament => "cmgen's cubes",
+            Self::PlayCanvas => "spherical.js and skybox.js of its shaders",
             Self::Radiance => "the brightness function that domelight writes",
             Self::Nvdiffrec => "render/util.py, cubemap_to_latlong",
         }
@@ -207,6 +225,7 @@ impl Convention {
             | Self::Three
             | Self::Babylon
             | Self::Filament
+            | Self::PlayCanvas
             | Self::Radiance => Proof::Program,
             Self::Pbrt | Self::Usd => Proof::Format,
             Self::Gltf
@@ -363,6 +382,7 @@ mod tests {
         match convention {
             Convention::Blender => 0.5 - y.atan2(x) / TAU,
             Convention::Mitsuba | Convention::Godot | Convention::Filament => x.atan2(-z) / TAU,
+            Convention::PlayCanvas => 0.5 + (-x).atan2(z) / TAU,
             Convention::Pbrt => y.atan2(x) / TAU,
             Convention::Usd => 0.25 + z.atan2(x) / TAU,
             Convention::Gltf | Convention::Three => 0.5 + z.atan2(x) / TAU,

@@ -19,11 +19,12 @@ mod faces;
 mod fisheye;
 mod overlap;
 
-pub(crate) use convert::from_lat_long_turned;
+pub(crate) use convert::from_lat_long_in;
 pub use convert::{fisheye_to_lat_long, from_lat_long, to_lat_long};
 pub use cube::CubeLayout;
 pub use faces::{CubeFaces, UnknownFaces};
 pub use fisheye::Fisheye;
+pub(crate) use overlap::MapFrame;
 
 use crate::math::{PI, TAU, Vec2, Vec3, functions, sqr, vec2, vec3};
 use crate::names::read_by_name;

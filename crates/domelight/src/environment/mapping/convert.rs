@@ -5,7 +5,7 @@
 
 use super::Mapping;
 use super::fisheye::Fisheye;
-use super::overlap::Overlap;
+use super::overlap::{MapFrame, Overlap};
 use crate::color::Rgb;
 use crate::environment::LatLongGrid;
 use crate::image::RgbImage;
@@ -92,23 +92,22 @@ pub fn from_lat_long(image: &RgbImage, mapping: Mapping, size: (usize, usize)) -
     if turned && width.is_multiple_of(2) {
         return turned_by_half(image);
     }
-    from_lat_long_turned(image, mapping, size, 0.0)
+    from_lat_long_in(image, mapping, size, MapFrame::default())
 }
 
-/// [`from_lat_long`] of a map that is rotated about the up axis by a fraction of a full turn, counterclockwise as seen
-/// from above.
+/// [`from_lat_long`] of a map that is turned.
 ///
 /// # Panics
 /// If the map or the size is empty.
-pub(crate) fn from_lat_long_turned(
+pub(crate) fn from_lat_long_in(
     image: &RgbImage,
     mapping: Mapping,
     (width, height): (usize, usize),
-    turn: f64,
+    frame: MapFrame,
 ) -> RgbImage {
     let grid = LatLongGrid::new(image.width, image.height);
     let rows = in_order(height, |y| {
-        let mut overlap = Overlap::new(&grid, mapping, width, height).turned(turn);
+        let mut overlap = Overlap::new(&grid, mapping, width, height).framed(frame);
         let mut row = vec![Rgb::BLACK; width];
         for (x, pixel) in row.iter_mut().enumerate() {
             overlap.texel(x, y);

@@ -10,7 +10,7 @@
 use super::fisheye::Fisheye;
 use super::{CubeLayout, Mapping};
 use crate::environment::LatLongGrid;
-use crate::math::functions;
+use crate::math::{Mat3, functions};
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 type Point = [f64; 2];
@@ -18,6 +18,16 @@ type Direction = [f64; 3];
 
 /// A lat-long texel and the solid angle \[sr\] that is shared with it.
 pub(super) type Share = (usize, f64);
+
+/// How a lat-long map stands in the picture that it is converted to.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct MapFrame {
+    /// The fraction of a full turn by which the map is rotated about the up axis, counterclockwise as seen from above.
+    pub(crate) turn: f64,
+    /// The directions in the map without its turn that the picture shows at +X, +Y and +Z, which may only permute and mirror the
+    /// axes; not of a lat-long picture.
+    pub(crate) axes: Option<Mat3>,
+}
 
 /// One texel at a time against a [`LatLongGrid`]; keeps its memory.
 pub(super) struct Overlap<'a> {
@@ -30,6 +40,8 @@ pub(super) struct Overlap<'a> {
     height: usize,
     /// How many columns the grid is turned counterclockwise, as seen from above.
     turn: f64,
+    /// The directions that the picture shows at +X, +Y and +Z, if they are others.
+    axes: Option<[Direction; 3]>,
     /// The texel's outline in columns (unwrapped) and cos θ.
     outline: Vec<Point>,
     /// The signed area in each rectangle within the outline's bounds.
@@ -66,7 +78,8 @@ impl<'a> Overlap<'a> {
         height: usize,
     ) -> Self {
         let (outline, areas, shares) = (Vec::new(), Vec::new(), Vec::new());
-        Self { grid, mapping, fisheye: None, width, height, turn: 0.0, outline, areas, shares }
+        let (fisheye, turn, axes) = (None, 0.0, None);
+        Self { grid, mapping, fisheye, width, height, turn, axes, outline, areas, shares }
     }
 
     pub(super) fn of_fisheye(
@@ -79,9 +92,18 @@ impl<'a> Overlap<'a> {
         Self { fisheye: Some(fisheye), ..angular }
     }
 
-    /// The overlap with the grid turned by a fraction of a full turn, counterclockwise as seen from above.
-    pub(super) fn turned(self, turn: f64) -> Self {
-        Self { turn: turn.rem_euclid(1.0) * self.grid.width() as f64, ..self }
+    /// The overlap with a map that is turned.
+    pub(super) fn framed(self, frame: MapFrame) -> Self {
+        let turn = frame.turn.rem_euclid(1.0) * self.grid.width() as f64;
+        let axes = frame.axes.map(|axes| [0, 1, 2].map(|i| axes.col(i).as_dvec3().to_array()));
+        Self { turn, axes, ..self }
+    }
+
+    /// The direction in the map at (u, v) of the picture.
+    fn vertex(&self, chart: &Chart, uv: Point) -> Vertex {
+        let d = chart.direction(uv);
+        let Some(axes) = self.axes else { return Vertex::new(d) };
+        Vertex::new(std::array::from_fn(|i| (0..3).map(|k| axes[k][i] * d[k]).sum()))
     }
 
     /// Fills [`Overlap::shares`] with those of texel (x, y).
@@ -122,7 +144,7 @@ impl<'a> Overlap<'a> {
     fn trace(&mut self, chart: &Chart, size: [f64; 2], at: Point) {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
             .map(|c: Point| [(at[0] + c[0]) / size[0], (at[1] + c[1]) / size[1]]);
-        let vertices = corners.map(|uv| Vertex::new(chart.direction(uv)));
+        let vertices = corners.map(|uv| self.vertex(chart, uv));
         for i in 0..4 {
             let j = (i + 1) % 4;
             self.push(vertices[i]);
@@ -139,7 +161,7 @@ impl<'a> Overlap<'a> {
         /// Halvings of an edge that leaves the disc.
         const AT_RIM: u32 = 8;
         let middle = [0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1])];
-        let m = Vertex::new(chart.direction(middle));
+        let m = self.vertex(chart, middle);
         let least = if chart.leaves_disc(from, to) { AT_RIM } else { 0 };
         if depth >= least
             && let Some(m) = arc(&a, &m, &b)
@@ -437,7 +459,7 @@ fn octahedral(p: Point) -> Direction {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::vec2;
+    use crate::math::{Vec3, vec2};
 
     #[test]
     fn charts_are_the_mappings_in_double_precision() {
@@ -450,35 +472,51 @@ mod tests {
                 let expected = mapping.direction(vec2(u as f32, v as f32));
                 let (Some(chart), Some(expected)) = (chart, expected) else { continue };
                 let d = chart.direction([u, v]).map(|c| c as f32);
-                let error = (crate::math::Vec3::from(d) - expected).length();
+                let error = (Vec3::from(d) - expected).length();
                 assert!(error < 4e-6, "{mapping} {u} {v}: {d:?} {expected}");
             }
         }
     }
 
-    /// Every texel of the grid is shared out, and every texel of the picture gets its solid angle.
+    /// Asserts that every texel of the grid is shared out once.
+    fn check_shares(mapping: Mapping, rows: usize, size: (usize, usize), frame: MapFrame) {
+        let grid = LatLongGrid::new(2 * rows, rows);
+        let (width, height) = size;
+        let mut overlap = Overlap::new(&grid, mapping, width, height).framed(frame);
+        let mut covered = vec![0.0; 2 * rows * rows];
+        for i in 0..width * height {
+            overlap.texel(i % width, i / width);
+            for &(j, share) in &overlap.shares {
+                covered[j] += share;
+            }
+        }
+        for (j, &covered) in covered.iter().enumerate() {
+            let error = covered / grid.solid_angle(j / (2 * rows)) - 1.0;
+            let what = format!("{mapping} {size:?} {frame:?} texel {j} of {rows} rows");
+            assert!(error.abs() < 2e-6, "{what}: {error:e}");
+        }
+    }
+
     #[test]
     fn all_of_the_sphere_is_shared_out_once() {
         for mapping in Mapping::ALL {
             for (rows, size) in
                 [(16, mapping.size_for(16)), (9, mapping.size_for(40)), (40, mapping.size_for(7))]
             {
-                let grid = LatLongGrid::new(2 * rows, rows);
-                let (width, height) = size;
-                let mut overlap = Overlap::new(&grid, mapping, width, height);
-                let mut covered = vec![0.0; 2 * rows * rows];
-                for i in 0..width * height {
-                    overlap.texel(i % width, i / width);
-                    for &(j, share) in &overlap.shares {
-                        covered[j] += share;
-                    }
-                }
-                for (j, &covered) in covered.iter().enumerate() {
-                    let error = covered / grid.solid_angle(j / (2 * rows)) - 1.0;
-                    assert!(
-                        error.abs() < 2e-6,
-                        "{mapping} {size:?} texel {j} of {rows} rows: {error:e}"
-                    );
+                check_shares(mapping, rows, size, MapFrame::default());
+            }
+        }
+    }
+
+    /// Wherever the poles are: in corners of texels, in their middle or on their edges.
+    #[test]
+    fn permuted_axes_share_out_all_of_the_sphere() {
+        for axes in [[Vec3::X, Vec3::Z, Vec3::Y], [Vec3::NEG_Y, Vec3::X, Vec3::NEG_Z]] {
+            let [x, y, z] = axes;
+            let frame = MapFrame { turn: 0.1, axes: Some(Mat3::from_cols(x, y, z)) };
+            for size in [1, 2, 3, 8, 15] {
+                for mapping in [Mapping::Octahedral, Mapping::Angular] {
+                    check_shares(mapping, 12, (size, size), frame);
                 }
             }
         }

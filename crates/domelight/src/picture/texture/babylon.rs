@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::Rgb;
 use crate::math::functions;
 use crate::parallel::in_order;
-use crate::rig::ibl::{BABYLON_SCALE, Cube, PrefilteredLight};
+use crate::rig::ibl::{BABYLON_SCALE, FilteredMap, PrefilteredLight};
 
 const MAGIC: [u8; 8] = [0x86, 0x16, 0x87, 0x96, 0xf6, 0xd6, 0x96, 0x36];
 
@@ -60,7 +60,7 @@ fn irradiance(light: &PrefilteredLight) -> serde_json::Value {
 }
 
 /// A face as PNG, whose rows are those of the texture from the last to the first.
-fn face(cube: &Cube, face: usize) -> io::Result<Vec<u8>> {
+fn face(cube: &FilteredMap, face: usize) -> io::Result<Vec<u8>> {
     let size = cube.size;
     let rows = cube.texels.chunks_exact(size).skip(face * size).take(size).rev();
     let texels: Vec<u8> = rows.flatten().flat_map(|&texel| rgbd(texel)).collect();

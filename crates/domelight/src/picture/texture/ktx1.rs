@@ -21,7 +21,7 @@ const RGBA16F: u32 = 0x881a;
 /// # Errors
 /// If writing to `out` fails.
 pub(super) fn encode(light: &PrefilteredLight, out: &mut dyn Write) -> io::Result<()> {
-    let (texture, _) = Texture::cube(&light.levels, TexelFormat::Half);
+    let (texture, _) = Texture::light(&light.levels, TexelFormat::Half);
     let metadata = entry("sh", &irradiance(light));
     let [columns, rows] = texture.size.map(|n| n as u32);
     let (faces, levels) = (texture.faces as u32, texture.levels.len() as u32);

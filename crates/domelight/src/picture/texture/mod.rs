@@ -1,4 +1,4 @@
-//! Textures as graphics interfaces take them: cubes with a chain of levels and tables, in KTX2 and DDS files.
+//! Textures as graphics interfaces take them: cubes and octahedral maps with a chain of levels, and tables, in KTX2 and DDS files.
 //!
 //! Of cubes, the first level is read: radiance in RGB9E5, half or single precision. Prefiltered light is also written in the
 //! files of two engines ([`RadianceFile`]).
@@ -8,6 +8,8 @@ mod babylon;
 pub mod dds;
 mod faces;
 #[cfg(feature = "io")]
+mod folder;
+#[cfg(feature = "io")]
 mod ktx1;
 pub mod ktx2;
 #[cfg(feature = "io")]
@@ -16,6 +18,8 @@ mod read;
 
 pub use faces::TextureErrorKind;
 use faces::{FaceBytes, check_cube, long, word};
+#[cfg(feature = "io")]
+pub use folder::{IblFile, IblFolder};
 #[cfg(feature = "io")]
 pub use radiance::{RadianceFile, RadianceFileError};
 pub(super) use read::{decode, texels};
@@ -27,7 +31,7 @@ use half::f16;
 use crate::Rgb;
 use crate::math::functions;
 use crate::names::read_by_name;
-use crate::rig::ibl::{BrdfTable, Cube};
+use crate::rig::ibl::{BrdfTable, FilteredMap, Layout};
 use crate::rig::tables::ShaderTables;
 
 /// The format of a texel.
@@ -44,8 +48,8 @@ pub enum TexelFormat {
 }
 
 impl TexelFormat {
-    /// Those in which cubes are written.
-    pub const CUBES: [Self; 2] = [Self::SharedExponent, Self::Half];
+    /// Those in which light is written.
+    pub const LIGHT: [Self; 2] = [Self::SharedExponent, Self::Half];
 
     /// Those of radiance.
     const RADIANCE: [Self; 3] = [Self::SharedExponent, Self::Half, Self::Single];
@@ -94,7 +98,7 @@ impl TexelFormat {
     }
 }
 
-read_by_name!(TexelFormat::CUBES, UnknownTexelFormat, "there is no format of texels");
+read_by_name!(TexelFormat::LIGHT, UnknownTexelFormat, "there is no format of texels");
 
 /// A file format of textures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,7 +153,7 @@ pub struct Texture {
     pub levels: Vec<Vec<u8>>,
 }
 
-/// What a format of texels changes in the light of a cube.
+/// What a format of texels changes in the light of a map.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EncodingLoss {
     /// The number of clipped texels in all levels.
@@ -163,13 +167,16 @@ pub struct EncodingLoss {
 }
 
 impl Texture {
-    /// The levels of a cube, and what the format changes. Negative and NaN channels become 0.
-    pub fn cube(levels: &[Cube], format: TexelFormat) -> (Self, EncodingLoss) {
+    /// The levels of a map, and what the format changes. Negative and NaN channels become 0.
+    pub fn light(levels: &[FilteredMap], format: TexelFormat) -> (Self, EncodingLoss) {
         let loss = EncodingLoss::of(levels, format.largest(), |texel| format.rounded(texel));
-        let encode = |cube: &Cube| cube.texels.iter().flat_map(|&t| encode(format, t)).collect();
-        let size = [levels.first().map_or(0, |cube| cube.size); 2];
+        let encode =
+            |map: &FilteredMap| map.texels.iter().flat_map(|&t| encode(format, t)).collect();
+        let first = levels.first();
+        let size = [first.map_or(0, |map| map.size); 2];
+        let faces = first.map_or(Layout::Cube, |map| map.layout).faces();
         let levels = levels.iter().map(encode).collect();
-        (Self { size, faces: 6, format, levels }, loss)
+        (Self { size, faces, format, levels }, loss)
     }
 
     /// A table of the BRDF, as pairs of half precision.
@@ -218,11 +225,11 @@ impl EncodingLoss {
     }
 
     /// What a format changes whose channels are at most `largest`, and that rounds texels so.
-    fn of(levels: &[Cube], largest: f32, round: impl Fn(Rgb) -> Rgb) -> Self {
+    fn of(levels: &[FilteredMap], largest: f32, round: impl Fn(Rgb) -> Rgb) -> Self {
         let is_clipped = |texel: &&Rgb| texel.max_component() > largest;
-        let texels = levels.iter().flat_map(|cube| &cube.texels).filter(is_clipped).count();
+        let texels = levels.iter().flat_map(|map| &map.texels).filter(is_clipped).count();
         let [mut total, mut clipped, mut rounded] = [0.0; 3];
-        let first = levels.iter().take(1).flat_map(|cube| cube.texels.iter().zip(weights(cube)));
+        let first = levels.iter().take(1).flat_map(|map| map.texels.iter().zip(weights(map)));
         for (&texel, weight) in first {
             let channels = texel.to_array().into_iter().zip(round(texel).to_array());
             for (c, in_file) in channels.map(|pair| (pair.0.max(0.0), pair.1)) {
@@ -236,14 +243,17 @@ impl EncodingLoss {
     }
 }
 
-/// The solid angles of a cube's texels, up to a factor.
-fn weights(cube: &Cube) -> impl Iterator<Item = f64> {
-    let size = cube.size;
-    (0..cube.texels.len()).map(move |i| {
-        let along = |i: usize| (2 * i + 1) as f64 / size as f64 - 1.0;
-        let (s, t) = (along(i % size), along(i / size % size));
-        let distance2 = 1.0 + s * s + t * t;
-        1.0 / (distance2 * distance2.sqrt())
+/// The solid angles of a map's texels, up to a factor.
+fn weights(map: &FilteredMap) -> impl Iterator<Item = f64> {
+    let FilteredMap { layout, size, .. } = *map;
+    (0..map.texels.len()).map(move |i| match layout {
+        Layout::Cube => {
+            let along = |i: usize| (2 * i + 1) as f64 / size as f64 - 1.0;
+            let (s, t) = (along(i % size), along(i / size % size));
+            let distance2 = 1.0 + s * s + t * t;
+            1.0 / (distance2 * distance2.sqrt())
+        }
+        Layout::Octahedral => 1.0,
     })
 }
 
@@ -299,7 +309,7 @@ mod tests {
 
     #[test]
     fn formats_are_read_by_their_names() {
-        for format in TexelFormat::CUBES {
+        for format in TexelFormat::LIGHT {
             assert_eq!(format.name().parse(), Ok(format));
         }
         for container in Container::ALL {
@@ -334,8 +344,8 @@ mod tests {
     fn clipped_light_is_counted() {
         let mut texels = vec![Rgb::WHITE; 24];
         texels[3] = Rgb::splat(2e5);
-        let cube = Cube { size: 2, texels };
-        let (texture, loss) = Texture::cube(&[cube], TexelFormat::Half);
+        let cube = FilteredMap { layout: Layout::Cube, size: 2, texels };
+        let (texture, loss) = Texture::light(&[cube], TexelFormat::Half);
         assert_eq!(loss.texels, 1);
         let expected = (2e5 - 65504.0) / (2e5 + 23.0);
         assert!((loss.clipped - expected).abs() < 1e-9, "{loss:?}");
@@ -347,10 +357,11 @@ mod tests {
     #[test]
     fn dim_light_that_is_rounded_away_is_counted() {
         let loss = |radiance: f32, format| {
-            let cube = Cube { size: 2, texels: vec![Rgb::splat(radiance); 24] };
-            Texture::cube(&[cube], format).1
+            let texels = vec![Rgb::splat(radiance); 24];
+            let cube = FilteredMap { layout: Layout::Cube, size: 2, texels };
+            Texture::light(&[cube], format).1
         };
-        for format in TexelFormat::CUBES {
+        for format in TexelFormat::LIGHT {
             for dim in [1e-9, 1e-40] {
                 let lost = loss(dim, format);
                 assert_eq!((lost.texels, lost.rounded), (0, -1.0));

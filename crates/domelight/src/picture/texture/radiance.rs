@@ -3,12 +3,12 @@
 use std::io::{self, Write};
 
 use super::{Container, EncodingLoss, TexelFormat, Texture, babylon, ktx1};
-use crate::rig::ibl::{Engine, PrefilteredLight};
+use crate::rig::ibl::{Engine, Layout, PrefilteredLight};
 
 /// A file format of prefiltered radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RadianceFile {
-    /// The levels as a cube texture, with this format of texels.
+    /// The levels as a texture, with this format of texels.
     Texture(Container, TexelFormat),
     /// `.ktx`: the levels in half precision and the irradiance, as Filament's `cmgen` writes them.
     Filament,
@@ -25,13 +25,23 @@ pub enum RadianceFileError {
         /// The number of columns.
         size: usize,
     },
+    /// A layout of texels that an engine does not read.
+    #[error(
+        "{engine} reads cubes alone from such files, not maps that are {layout}; write .ktx2 or .dds"
+    )]
+    Layout {
+        /// The name of the layout.
+        layout: &'static str,
+        /// The name of the engine.
+        engine: &'static str,
+    },
 }
 
 impl RadianceFile {
     /// The extensions of all formats.
     pub const EXTENSIONS: [&str; 4] = ["ktx2", "dds", "ktx", "env"];
 
-    /// The format whose files have this extension, in any case. `texels` is the format of texels in a cube texture.
+    /// The format whose files have this extension, in any case. `texels` is the format of texels in a texture.
     pub fn of_extension(extension: &str, texels: TexelFormat) -> Option<Self> {
         match extension.to_ascii_lowercase().as_str() {
             "ktx" => Some(Self::Filament),
@@ -67,11 +77,18 @@ impl RadianceFile {
         })
     }
 
-    /// Whether the format holds a cube whose faces have `size` columns.
+    /// Whether the format holds a map whose faces have `size` columns.
     ///
     /// # Errors
     /// If it does not.
-    pub const fn check(self, size: usize) -> Result<(), RadianceFileError> {
+    pub fn check(self, layout: Layout, size: usize) -> Result<(), RadianceFileError> {
+        match (layout, self.engine()) {
+            (Layout::Octahedral, Some(engine)) => {
+                let (layout, engine) = (layout.name(), engine.name());
+                return Err(RadianceFileError::Layout { layout, engine });
+            }
+            (Layout::Cube | Layout::Octahedral, _) => {}
+        }
         match self {
             Self::Babylon if !size.is_power_of_two() => Err(RadianceFileError::Size { size }),
             Self::Babylon | Self::Filament | Self::Texture(..) => Ok(()),
@@ -81,11 +98,15 @@ impl RadianceFile {
     /// Writes the radiance of prefiltered light; [`RadianceFile::loss`] says what is lost.
     ///
     /// # Errors
-    /// If writing to `out` fails.
+    /// If the format does not hold the map ([`RadianceFile::check`]), or writing to `out` fails.
     pub fn encode(self, light: &PrefilteredLight, out: &mut dyn Write) -> io::Result<()> {
+        if let Some(first) = light.levels.first() {
+            let invalid = |error| io::Error::new(io::ErrorKind::InvalidInput, error);
+            self.check(first.layout, first.size).map_err(invalid)?;
+        }
         match self {
             Self::Texture(container, texels) => {
-                container.encode(&Texture::cube(&light.levels, texels).0, out)
+                container.encode(&Texture::light(&light.levels, texels).0, out)
             }
             Self::Filament => ktx1::encode(light, out),
             Self::Babylon => babylon::encode(light, out),
@@ -97,7 +118,7 @@ impl RadianceFile {
 mod tests {
     use super::*;
     use crate::environment::{Environment, Orientation};
-    use crate::rig::ibl::{Cube, IblSettings, prefilter};
+    use crate::rig::ibl::{FilteredMap, IblSettings, prefilter};
     use crate::{Rgb, RgbImage};
 
     /// Light of constant radiance for an engine.
@@ -177,7 +198,11 @@ mod tests {
     fn light_that_a_file_rounds_away_is_counted() {
         let light = gray(Engine::Babylon, 1);
         let gray = |radiance: f32| PrefilteredLight {
-            levels: vec![Cube { size: 1, texels: vec![Rgb::splat(radiance); 6] }],
+            levels: vec![FilteredMap {
+                layout: Layout::Cube,
+                size: 1,
+                texels: vec![Rgb::splat(radiance); 6],
+            }],
             ..light.clone()
         };
         for file in [RadianceFile::Babylon, RadianceFile::Filament] {
@@ -195,7 +220,11 @@ mod tests {
         assert_eq!(of("Dds"), Some(RadianceFile::Texture(Container::Dds, TexelFormat::Half)));
         assert!(RadianceFile::EXTENSIONS.into_iter().all(|extension| of(extension).is_some()));
         assert_eq!(of("png"), None);
-        assert!(RadianceFile::Babylon.check(48).unwrap_err().to_string().contains("not 48"));
-        assert!(RadianceFile::Filament.check(48).is_ok());
+        let refusal = |file: RadianceFile, layout| Some(file.check(layout, 48).err()?.to_string());
+        assert!(refusal(RadianceFile::Babylon, Layout::Cube).unwrap().contains("not 48"));
+        assert_eq!(refusal(RadianceFile::Filament, Layout::Cube), None);
+        assert_eq!(refusal(of("ktx2").unwrap(), Layout::Octahedral), None);
+        let other = refusal(RadianceFile::Filament, Layout::Octahedral).unwrap();
+        assert!(other.contains("filament reads cubes alone"), "{other}");
     }
 }

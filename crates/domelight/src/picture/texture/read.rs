@@ -49,23 +49,23 @@ mod tests {
     use super::super::{TexelFormat, Texture};
     use super::*;
     use crate::math::vec2;
-    use crate::rig::ibl::Cube;
+    use crate::rig::ibl::{FilteredMap, Layout};
 
     /// A cube with a color of its own in every direction, and smaller levels.
-    fn cubes() -> Vec<Cube> {
+    fn cubes() -> Vec<FilteredMap> {
         let cube = |size: usize| {
+            let layout = Layout::Cube;
             let texel = |i: usize| {
-                let (face, x, y) = (i / (size * size), i % size, i / size % size);
-                let d = Cube::direction(size, face, x, y);
+                let d = layout.direction(size, i);
                 Rgb::new(2.0 + d.x, 2.0 + d.y, 2.0 + d.z)
             };
-            Cube { size, texels: (0..6 * size * size).map(texel).collect() }
+            FilteredMap { layout, size, texels: (0..layout.texels(size)).map(texel).collect() }
         };
         vec![cube(5), cube(2), cube(1)]
     }
 
     fn files(format: TexelFormat) -> [(Container, Vec<u8>); 2] {
-        let (texture, _) = Texture::cube(&cubes(), format);
+        let (texture, _) = Texture::light(&cubes(), format);
         let (mut ktx, mut direct3d) = (Vec::new(), Vec::new());
         ktx2::encode(&texture, &mut ktx).unwrap();
         dds::encode(&texture, &mut direct3d).unwrap();

@@ -2,8 +2,8 @@
 //!
 //! Read in the engines' sources; docs/ibl.md says what of it was proved.
 
+use super::axes::CubeAxes;
 use super::brdf::TableTerms;
-use super::cube::CubeAxes;
 use crate::environment::convention::Convention;
 use crate::math::{Vec3, functions};
 use crate::names::read_by_name;
@@ -23,6 +23,8 @@ pub enum Engine {
     Bevy,
     /// Unreal Engine 5.
     Unreal,
+    /// PlayCanvas.
+    PlayCanvas,
 }
 
 /// The levels below which Filament's tool does not go: 16 columns.
@@ -47,8 +49,15 @@ pub(super) fn linear_roughness(size: usize) -> Vec<f32> {
 
 impl Engine {
     /// All engines.
-    pub const ALL: [Self; 6] =
-        [Self::Three, Self::Filament, Self::Babylon, Self::Godot, Self::Bevy, Self::Unreal];
+    pub const ALL: [Self; 7] = [
+        Self::Three,
+        Self::Filament,
+        Self::Babylon,
+        Self::Godot,
+        Self::Bevy,
+        Self::Unreal,
+        Self::PlayCanvas,
+    ];
 
     /// The name on the command line.
     pub const fn name(self) -> &'static str {
@@ -59,6 +68,7 @@ impl Engine {
             Self::Godot => "godot",
             Self::Bevy => "bevy",
             Self::Unreal => "unreal",
+            Self::PlayCanvas => "playcanvas",
         }
     }
 
@@ -71,6 +81,7 @@ impl Engine {
             Convention::Godot => Some(Self::Godot),
             Convention::Bevy => Some(Self::Bevy),
             Convention::Unreal => Some(Self::Unreal),
+            Convention::PlayCanvas => Some(Self::PlayCanvas),
             Convention::Blender
             | Convention::Mitsuba
             | Convention::Pbrt
@@ -91,8 +102,8 @@ impl Engine {
             // The center is +Z, its right half −X; cubes are looked up with the world direction.
             Self::Filament | Self::Godot => [Vec3::NEG_X, Vec3::Y, Vec3::NEG_Z],
             // Babylon's world is left-handed; the center is +Z, its right half +X. In Bevy, panoramas face the camera's
-            // −Z, and cubes are looked up with −z.
-            Self::Babylon | Self::Bevy => [Vec3::X, Vec3::Y, Vec3::NEG_Z],
+            // −Z, and cubes are looked up with −z. In PlayCanvas, the center is +Z, and cubes are looked up with −x.
+            Self::Babylon | Self::Bevy | Self::PlayCanvas => [Vec3::X, Vec3::Y, Vec3::NEG_Z],
             // The world is left-handed with +Z up; the center is −Y, its right half +X.
             Self::Unreal => [Vec3::X, Vec3::Z, Vec3::Y],
         };
@@ -103,7 +114,7 @@ impl Engine {
     pub fn roughness(self, size: usize) -> Vec<f32> {
         let last = size.max(1).ilog2();
         match self {
-            Self::Three | Self::Godot | Self::Bevy => linear_roughness(size),
+            Self::Three | Self::Godot | Self::Bevy | Self::PlayCanvas => linear_roughness(size),
             // The shader looks up level r (2 − r) · last.
             Self::Filament => {
                 let last = (size / FILAMENT_SMALLEST).max(1).ilog2();
@@ -135,7 +146,9 @@ impl Engine {
     /// What the engine's table of the BRDF holds.
     pub const fn table(self) -> TableTerms {
         match self {
-            Self::Three | Self::Godot | Self::Bevy | Self::Unreal => TableTerms::ScaleAndBias,
+            Self::Three | Self::Godot | Self::Bevy | Self::Unreal | Self::PlayCanvas => {
+                TableTerms::ScaleAndBias
+            }
             Self::Filament => TableTerms::BiasAndTotalUpward,
             Self::Babylon => TableTerms::BiasAndTotal,
         }
@@ -156,7 +169,11 @@ mod tests {
             let handedness = x.cross(y).dot(z);
             let expected = match engine {
                 Engine::Filament | Engine::Godot => 1.0,
-                Engine::Three | Engine::Babylon | Engine::Bevy | Engine::Unreal => -1.0,
+                Engine::Three
+                | Engine::Babylon
+                | Engine::Bevy
+                | Engine::Unreal
+                | Engine::PlayCanvas => -1.0,
             };
             assert_eq!(handedness, expected, "{}", engine.name());
             assert_eq!(engine.name().parse(), Ok(engine));
