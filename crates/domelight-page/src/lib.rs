@@ -3,7 +3,6 @@
 //!
 //! Settings come as JSON, results as JSON or as arrays of numbers. `domelight-web` binds the calls to JavaScript.
 
-mod archive;
 mod calls;
 mod direction;
 mod error;

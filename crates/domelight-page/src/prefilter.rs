@@ -1,4 +1,4 @@
-//! Light for engines and shaders: prefiltered cubes, tables, and the code that samples them.
+//! Light for engines and shaders: prefiltered maps, tables, and the code that samples them.
 
 use domelight::picture::exr::ExrLayers;
 use domelight::picture::texture::{
@@ -10,9 +10,9 @@ use domelight::rig::ibl::{
 };
 use domelight::rig::tables::{ShaderLanguage, ShaderTables, TableSettings};
 use domelight::{Rgb, RgbImage};
+use rawzip::ZipArchiveWriter;
 use serde::{Deserialize, Serialize};
 
-use crate::archive::Archive;
 use crate::error::refused;
 use crate::setup::{parse, to_json};
 use crate::{Engine, Error};
@@ -128,18 +128,23 @@ fn encoded(texture: &Texture, container: &str) -> Result<Vec<u8>, Error> {
 }
 
 impl Prefiltered {
-    /// The files that the program writes into a folder.
+    /// The files that the program writes into a folder, as a ZIP archive.
     fn archive(&self, state: &IblState) -> Result<Vec<u8>, Error> {
         let (light, settings, sun) = (&self.light, &self.settings, self.sun.as_ref());
         let (engine, texels) = (state.target()?, state.format()?);
         let folder = IblFolder { light, settings, engine, texels, sun };
-        let mut archive = Archive::default();
+        let mut bytes = Vec::new();
+        let mut archive = ZipArchiveWriter::new(&mut bytes);
         for file in IblFile::all(light.levels.len()) {
-            let mut bytes = Vec::new();
-            folder.encode(file, &mut bytes).map_err(refused)?;
-            archive.add(&file.name(), &bytes)?;
+            // Not compressed, and without a date: the same files make the same bytes.
+            let (mut entry, config) = archive.new_file(&file.name()).start().map_err(refused)?;
+            let mut content = config.wrap(&mut entry);
+            folder.encode(file, &mut content).map_err(refused)?;
+            let (_, sizes) = content.finish().map_err(refused)?;
+            entry.finish(sizes).map_err(refused)?;
         }
-        Ok(archive.finish())
+        archive.finish().map_err(refused)?;
+        Ok(bytes)
     }
 }
 

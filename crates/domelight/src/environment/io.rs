@@ -10,7 +10,7 @@ pub use super::repair::{OVERFLOWED, SanitizeReport, sanitize};
 use super::mapping::{
     CubeFaces, CubeLayout, Fisheye, Mapping, ShapeError, fisheye_to_lat_long, to_lat_long,
 };
-use super::repair::finite_light;
+use super::repair::{finite_light, holds_radiance, is_radiance};
 use crate::math::{Mat3, Vec3, vec2};
 use crate::memory;
 use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
@@ -244,23 +244,12 @@ pub fn probe_from_picture(
     if options.strict {
         require_radiance(&image, file)?;
     }
-    let before = finite_light(&image, mapping);
-    let sanitized = sanitize(&mut image, mapping);
-    if sanitized != SanitizeReport::default() {
-        let SanitizeReport { negative, non_finite, infinite } = sanitized;
-        let overflowed = match infinite {
-            0 => String::new(),
-            _ => format!(
-                "; {infinite} infinite ones became as bright as their neighbors, at least {OVERFLOWED}: a sun or lamp may be \
-                 too dim"
-            ),
-        };
+    let mut sanitized = SanitizeReport::default();
+    if !holds_radiance(&image) {
+        let before = finite_light(&image, mapping);
+        sanitized = sanitize(&mut image, mapping);
         let change = 100.0 * (finite_light(&image, mapping) / before - 1.0);
-        let changed =
-            if change.is_finite() { format!(", {change:+.2} % light") } else { String::new() };
-        warnings.push(format!(
-            "{file}: repaired {negative} negative and {non_finite} NaN or infinite values{changed}{overflowed}"
-        ));
+        warnings.push(format!("{file}: {}", repair_warning(sanitized, change)));
     }
     let file_size = (image.width, image.height);
     let height = mapping.lat_long_height(image.width, image.height);
@@ -274,6 +263,23 @@ pub fn probe_from_picture(
         (_, None) => to_lat_long(&image, mapping, height),
     };
     Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings, notes })
+}
+
+/// What was repaired, and by how many percent the light changed.
+fn repair_warning(report: SanitizeReport, change: f64) -> String {
+    let SanitizeReport { negative, non_finite, infinite } = report;
+    let overflowed = match infinite {
+        0 => String::new(),
+        _ => format!(
+            "; {infinite} infinite ones became as bright as their neighbors, at least {OVERFLOWED}: a sun or lamp may be \
+             too dim"
+        ),
+    };
+    let changed =
+        if change.is_finite() { format!(", {change:+.2} % light") } else { String::new() };
+    format!(
+        "repaired {negative} negative and {non_finite} NaN or infinite values{changed}{overflowed}"
+    )
 }
 
 /// The view that the file states, unless somebody says what the map is or the view is what an angular map is anyway.
@@ -367,11 +373,10 @@ fn in_display_window(
     picture.in_display_window()
 }
 
-fn is_radiance(value: f32) -> bool {
-    value.is_finite() && value >= 0.0
-}
-
 fn require_radiance(image: &RgbImage, file: &str) -> Result<(), ProbeError> {
+    if holds_radiance(image) {
+        return Ok(());
+    }
     let bad = |pixel: &Rgb| pixel.to_array().into_iter().filter(|&c| !is_radiance(c)).count();
     let count = image.pixels.iter().map(bad).sum();
     let Some(first) = image.pixels.iter().position(|pixel| bad(pixel) > 0) else { return Ok(()) };

@@ -32,17 +32,31 @@ const RADII: RangeInclusive<usize> = 1..=8;
 /// The multiple of a missing value that its square should hold.
 const EASILY: f64 = 16.0;
 
+/// Whether a value is finite and ≥ 0.
+pub(super) fn is_radiance(value: f32) -> bool {
+    (0.0..=f32::MAX).contains(&value)
+}
+
+/// Whether every value is finite and ≥ 0.
+pub(super) fn holds_radiance(image: &RgbImage) -> bool {
+    // Look at many texels before asking, as vectors do.
+    image.pixels.chunks(1024).all(|texels| {
+        let and = |all: bool, p: &Rgb| all & is_radiance(p.r) & is_radiance(p.g) & is_radiance(p.b);
+        texels.iter().fold(true, and)
+    })
+}
+
 /// Makes every value finite and ≥ 0, by the rules of this module. A channel without any finite value becomes 0. In lat-long
 /// maps, texels count by their solid angles.
 pub fn sanitize(image: &mut RgbImage, mapping: Mapping) -> SanitizeReport {
     let mut report = SanitizeReport::default();
+    if holds_radiance(image) {
+        return report;
+    }
     for value in image.pixels.iter().flat_map(|pixel| pixel.to_array()) {
         report.negative += usize::from(value < 0.0 && value.is_finite());
         report.non_finite += usize::from(!value.is_finite());
         report.infinite += usize::from(value == f32::INFINITY);
-    }
-    if report == SanitizeReport::default() {
-        return report;
     }
     let (width, height) = (image.width, image.height);
     let weights = row_weights(width, height, mapping);
