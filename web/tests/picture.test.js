@@ -238,10 +238,12 @@ test("zooming ends far outside and close to the scene", async () => {
 });
 
 test("the default picture begins with its own exposure, without waiting for it", async () => {
-  // On a busy machine the whole picture begins before its preview is done.
-  const { page, done } = await open("", { ready: "html:is([data-preview], [data-ready])" });
-  const begun = await page.evaluate(() => window.domelight.picture.view.look.exposure);
-  await page.waitForFunction(() => window.domelight.picture.automatic.view);
-  assert.equal(begun, Number((await page.evaluate(() => window.domelight.picture.automatic.exposure)).toFixed(2)));
+  const script = `document.addEventListener("painted", ({ target }) => {
+    if (target.id === "film") window.begun ??= window.domelight?.picture.view?.look.exposure;
+  }, true);`;
+  const { page, done } = await open("", { script });
+  await page.waitForFunction(() => window.begun !== undefined && window.domelight.picture.automatic.view);
+  const [begun, automatic] = await page.evaluate(() => [window.begun, window.domelight.picture.automatic.exposure]);
+  assert.equal(begun, Number(automatic.toFixed(2)));
   await done();
 });
