@@ -137,7 +137,7 @@ impl Prefiltered {
         let mut archive = ZipArchiveWriter::new(&mut bytes);
         for file in IblFile::all(light.levels.len()) {
             // Not compressed, and without a date: the same files make the same bytes.
-            let (mut entry, config) = archive.new_file(&file.name()).start().map_err(refused)?;
+            let (mut entry, config) = archive.new_file(file.name()).start().map_err(refused)?;
             let mut content = config.wrap(&mut entry);
             folder.encode(file, &mut content).map_err(refused)?;
             let (_, sizes) = content.finish().map_err(refused)?;

@@ -382,11 +382,10 @@ mod tests {
         match convention {
             Convention::Blender => 0.5 - y.atan2(x) / TAU,
             Convention::Mitsuba | Convention::Godot | Convention::Filament => x.atan2(-z) / TAU,
-            Convention::PlayCanvas => 0.5 + (-x).atan2(z) / TAU,
             Convention::Pbrt => y.atan2(x) / TAU,
             Convention::Usd => 0.25 + z.atan2(x) / TAU,
             Convention::Gltf | Convention::Three => 0.5 + z.atan2(x) / TAU,
-            Convention::Babylon => 0.5 + (-x).atan2(z) / TAU,
+            Convention::Babylon | Convention::PlayCanvas => 0.5 + (-x).atan2(z) / TAU,
             Convention::Unity => 0.5 - z.atan2(-x) / TAU,
             Convention::Radiance => 0.5 + x.atan2(y) / TAU,
             Convention::Unreal | Convention::Bevy | Convention::Nvdiffrec => {
