@@ -76,20 +76,23 @@ const told = (list) => (list.length ? `${list.join(", ")} ms` : "none");
 const both = async () => `${told(await tasks())}; by CPU time ${told(await trace.stop())}`;
 line("tasks of the main thread over 50 ms, from the start on", await both());
 await trace.start();
-/** The times to the first pictures of new views [ms]. */
+/** The times from the start of new views to their first tiles [ms]. */
 async function newViews(page) {
   const times = [];
   await page.focus("#viewer");
   for (let i = 0; i < 24; i++) {
-    await page.evaluate(() => delete document.documentElement.dataset.preview);
+    const before = await page.evaluate(() => window.domelight.picture.times.start);
     await page.keyboard.press("ArrowLeft");
-    await page.waitForSelector("html[data-preview]");
-    times.push(Number(await page.evaluate(() => document.documentElement.dataset.preview)));
+    const time = await page.waitForFunction((before) => {
+      const { start, first } = window.domelight.picture.times;
+      return start > before && first > start && first - start;
+    }, before);
+    times.push(await time.jsonValue());
     await page.waitForTimeout(i % 2 ? 700 : 60);
   }
   return times;
 }
-line("first picture of a new view", spread(await newViews(page)));
+line("first tiles of a new view", spread(await newViews(page)));
 line("tasks of the main thread over 50 ms, orbiting", await both());
 
 // A drag around the scene, as fast as the page draws frames.
@@ -113,26 +116,6 @@ const quantile = (q) => frames[Math.floor(q * (frames.length - 1))].toFixed(1);
 line("time between frames, dragging", `median ${quantile(0.5)} ms, 95 % under ${quantile(0.95)} ms, of ${frames.length}`);
 await done();
 
-/** The times from a key to the first tiles of the new view [ms]. */
-async function firstTiles(page) {
-  const times = [];
-  for (let i = 0; i < 12; i++) {
-    await page.waitForTimeout(1000);
-    times.push(await page.evaluate(() => new Promise((resolve) => {
-      const token = () => Math.max(0, ...window.domelight.picture.jobs.map((job) => job.token));
-      const film = document.getElementById("film"), start = performance.now(), before = token();
-      const painted = () => {
-        if (token() === before) return;
-        film.removeEventListener("painted", painted);
-        resolve(performance.now() - start);
-      };
-      film.addEventListener("painted", painted);
-      document.getElementById("viewer").dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true }));
-    })));
-  }
-  return times;
-}
-
 /** The program as the page's engine: times from its start to its address and to the first picture, and of new views [ms]. */
 const started = [], shown = [], views = [];
 for (let i = 0; i < OPENED; i++) {
@@ -143,7 +126,7 @@ for (let i = 0; i < OPENED; i++) {
   const { page, done } = await open("", { at, script: NOTES });
   await page.waitForFunction(() => window.seen.length > 0);
   shown.push(await page.evaluate(() => performance.timeOrigin + window.seen[0][1]) - start);
-  if (i === 0) views.push(...await firstTiles(page));
+  if (i === 0) views.push(...await newViews(page));
   await done();
   child.kill("SIGKILL");
 }

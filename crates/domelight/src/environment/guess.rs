@@ -180,7 +180,7 @@ fn typical(image: &RgbImage, is_inside: impl Fn(Vec2) -> bool) -> f64 {
     }
 }
 
-/// From one texel that is looked at to the next, along an edge with so many.
+/// The distance between texels that are looked at, along an edge of `extent` texels.
 fn step(extent: usize) -> usize {
     /// The texels along an edge that suffice.
     const ENOUGH: usize = 512;
