@@ -1,6 +1,8 @@
 //! The renderer: the same bits however the work is divided, strategies that agree pixel by pixel,
 //! and layers that mean what they say.
 
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
 use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::{CompensatedTable, Environment, Orientation};
 use domelight::geometry::Mesh;
@@ -447,7 +449,6 @@ fn tiny_and_huge_scenes_are_shadowed_alike() {
 
 #[test]
 fn a_canceled_render_keeps_what_is_done() {
-    use std::sync::atomic::{AtomicUsize, Ordering};
     struct After(AtomicUsize);
     impl Observer for After {
         fn tile_finished(&self, _: &domelight::render::Counts) {
@@ -469,7 +470,6 @@ fn a_canceled_render_keeps_what_is_done() {
 
 #[test]
 fn passes_of_one_two_and_four_samples_go_on_where_they_were_ended() {
-    use std::sync::atomic::{AtomicBool, Ordering};
     #[derive(Default)]
     struct OneTile(AtomicBool);
     impl Observer for OneTile {
@@ -490,11 +490,56 @@ fn passes_of_one_two_and_four_samples_go_on_where_they_were_ended() {
     assert!(interrupted.film() == start().finish(), "an interruption changed the picture");
 }
 
+/// Cuts a render short while scouts are under way.
+#[derive(Default)]
+struct CutShort {
+    asked: AtomicUsize,
+    after: usize,
+}
+
+impl Observer for CutShort {
+    fn has_cut_short(&self) -> bool {
+        self.asked.fetch_add(1, Ordering::Relaxed) >= self.after
+    }
+}
+
+#[test]
+fn scouts_that_are_cut_short_are_sent_anew() {
+    let (scene, environment) = (scene("phong:50:0.5:0.3"), environment());
+    let settings = RenderSettings { n_samples: 6, passes: Passes::Doubling, ..small() };
+    let camera = camera(&settings);
+    let product = ProductSampling::new(&environment, 4);
+    let start = || Renderer::with_strategy(&scene, &camera, &environment, &product, settings);
+    let mut renderer = start();
+    for after in [0, 1, 10, 20] {
+        assert!(!renderer.run(&CutShort { after, ..CutShort::default() }));
+        assert_eq!(renderer.least_samples(), 0);
+    }
+    assert!(renderer.finish() == start().finish(), "scouts that were cut short were believed");
+}
+
+#[test]
+fn the_relative_variance_is_that_of_the_layers() {
+    let (scene, environment) = (scene("phong:50:0.5:0.3"), environment());
+    let settings = RenderSettings { n_samples: 4, ..small() };
+    let (camera, strategy) = (camera(&settings), mis(&environment));
+    let mut renderer = Renderer::with_strategy(&scene, &camera, &environment, &strategy, settings);
+    assert_eq!(renderer.relative_variance(), 0.0);
+    renderer.run(&());
+    let Layers { variance, color, .. } = renderer.rendering().layers;
+    let of_pixel = |(variance, color): (&Rgb, &Rgb)| {
+        let luminance = f64::from(color.luminance());
+        f64::from(variance.luminance()) / (luminance * luminance + 0.01)
+    };
+    let expected: f64 = variance.pixels.iter().zip(&color.pixels).map(of_pixel).sum();
+    let found = renderer.relative_variance();
+    assert!((found / expected - 1.0).abs() < 1e-6, "{found} instead of {expected}");
+}
+
 /// Passes of a set length end with the same picture for a strategy that learns nothing, also where an observer left
 /// tiles behind.
 #[test]
 fn short_passes_end_with_the_same_picture() {
-    use std::sync::atomic::{AtomicUsize, Ordering};
     struct SomeTiles(AtomicUsize);
     impl Observer for SomeTiles {
         fn tile_finished(&self, _: &domelight::render::Counts) {

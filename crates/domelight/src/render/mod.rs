@@ -206,7 +206,8 @@ pub trait Observer: Sync {
         false
     }
 
-    /// Whether they have been, so that running tiles keep the samples that they had.
+    /// Whether the render is cut short: scouts of a strategy that learns end at once, and, if functions of the caller may be
+    /// cut short, running tiles keep the samples that they had.
     fn has_cut_short(&self) -> bool {
         false
     }

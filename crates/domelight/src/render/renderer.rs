@@ -271,7 +271,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let pass = match self.interrupted.take() {
             Some((of, pass)) if of == start && pass.n_samples <= most => pass,
             _ => {
-                let (pass, scout_rays) = self.begin_pass(start, most);
+                let (pass, scout_rays) = self.begin_pass(start, most, observer);
                 self.rays_ahead += scout_rays;
                 pass
             }
@@ -313,7 +313,12 @@ impl<'a, S: Strategy> Renderer<'a, S> {
 
     /// Prepares the pass that begins at sample `start`, with at most `most` samples. Returns the number of scouts' shadow
     /// rays, too.
-    fn begin_pass(&self, start: u32, most: u32) -> (Pass<S>, u64) {
+    fn begin_pass(
+        &self,
+        start: u32,
+        most: u32,
+        observer: &(impl Observer + ?Sized),
+    ) -> (Pass<S>, u64) {
         let Self { context, strategy, tiling, .. } = self;
         let (strategy, settings): (&S, _) = (strategy, &context.settings);
         let left = settings.n_samples - start;
@@ -332,7 +337,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let mut pass = Pass { n_samples, set, adaptive, mean_log, brightness, is_scouting, shared };
         let mut scout_rays = 0;
         if strategy.n_rounds() > 1 {
-            let (scouting, rays) = scout(context, strategy, &pass);
+            let (scouting, rays) = scout(context, strategy, &pass, observer);
             if let Some((scouted, findings)) = scouting {
                 pass.mean_log = adaptive.then_some(scouted.mean_log);
                 pass.brightness = scouted.brightness;
@@ -497,12 +502,26 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         Ok(())
     }
 
+    /// The expected squared error relative to the brightness of each pixel, summed over the pixels: variance / (luminance² +
+    /// 0.01), and 0 for fewer than two samples.
+    pub fn relative_variance(&self) -> f64 {
+        let variance = self.variance_sums();
+        let of_tile = |tile: &Tile| tile.relative_variance(&variance);
+        // Sum in order, so that threads do not change the sum.
+        self.tiles.par_iter().map(of_tile).collect::<Vec<_>>().into_iter().sum()
+    }
+
+    fn variance_sums(&self) -> VarianceSums {
+        let mut variance = VarianceSums::default();
+        self.tiles.iter().for_each(|tile| variance.add(&tile.variance_sums()));
+        variance
+    }
+
     /// The picture of all tiles so far, coarse where nothing was rendered; see [`Renderer::whole_film`].
     pub fn rendering(&self) -> Rendering {
         let window = self.tiling.window(&self.range);
         let mut layers = Layers::new(window.width, window.height);
-        let mut variance = VarianceSums::default();
-        self.tiles.iter().for_each(|tile| variance.add(&tile.variance_sums()));
+        let variance = self.variance_sums();
         for tile in self.tiles.iter().chain(&self.coarse_tiles()) {
             tile.put_into(&mut layers, window, &variance);
         }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::allocation::{OCTAVES, mean_count};
 use super::tile::{Pass, SECOND_SETS, Scratch, Tile};
 use super::tiling::Window;
-use super::{RenderContext, RenderSettings};
+use super::{Observer, RenderContext, RenderSettings};
 use crate::sampling::{Pcg32, Sampler};
 use crate::strategy::Strategy;
 use crate::strategy::levels::N_LEVELS;
@@ -134,10 +134,13 @@ type Scouting<S> = (Scouted, Vec<<S as Strategy>::Findings>);
 /// on a pixel's own samples would introduce bias. They are rendered twice: a few with the same number of samples in
 /// every pixel, which gives a first scale; then all of them with that scale, because a strategy that learns has less
 /// error with more samples to learn from. The first ones tell the others what they have found.
+///
+/// Once the observer has cut the render short, no more are sent, and what they tell is worth nothing.
 pub(super) fn scout<S: Strategy>(
     context: &RenderContext,
     strategy: &S,
     pass: &Pass<S>,
+    observer: &(impl Observer + ?Sized),
 ) -> (Option<Scouting<S>>, u64) {
     /// The number of pixels of the picture per window. Scouts cost a fiftieth of the render, less for large pictures.
     const PIXELS_PER_WINDOW: usize = 20 * SCOUT_WINDOW * SCOUT_WINDOW;
@@ -172,6 +175,7 @@ pub(super) fn scout<S: Strategy>(
     let mut send = |n: usize, pass: &Pass<S>| -> (Vec<Scout>, Vec<S::Findings>) {
         let windows: Vec<_> = spread(width, height, SCOUT_WINDOW, n)
             .into_par_iter()
+            .filter(|_| !observer.has_cut_short())
             .map_init(Box::<Scratch<S>>::default, |scratch, window| {
                 let counts = Tile::new(window).render(context, strategy, pass, scratch, &());
                 let scouts: Vec<_> = Scout::of_window(scratch, second_sets).collect();

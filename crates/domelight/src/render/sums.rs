@@ -405,6 +405,12 @@ impl PixelSums {
             narrowed(scale.inside * (independent[c] - coverage[c]) + of_coverage * coverage[c])
         }))
     }
+
+    /// The variance of the mean relative to the brightness: variance / (luminance² + 0.01).
+    pub(super) fn relative_variance(&self, scale: Scale) -> f64 {
+        let luminance = f64::from(self.mean(self.color).luminance());
+        f64::from(self.variance(scale).luminance()) / (luminance * luminance + REGULARIZER)
+    }
 }
 
 /// The nearest finite single-precision number.

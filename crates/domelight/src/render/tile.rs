@@ -243,6 +243,19 @@ impl Tile {
         VarianceSums::of(self.pixels.iter().filter_map(PixelSums::contrast))
     }
 
+    /// Σ over its pixels of variance / (luminance² + 0.01); `variance` is that of the picture.
+    pub(super) fn relative_variance(&self, variance: &VarianceSums) -> f64 {
+        // Reuse the scale for neighbors with the same number of samples, because it costs a power.
+        let mut scale_of = (0, variance.scale(0));
+        let of_pixel = |sums: &PixelSums| {
+            if scale_of.0 != sums.n_samples {
+                scale_of = (sums.n_samples, variance.scale(sums.n_samples));
+            }
+            sums.relative_variance(scale_of.1)
+        };
+        self.pixels.iter().map(of_pixel).sum()
+    }
+
     /// Copies the sums of a tile whose work is not counted here.
     pub(super) fn restore(&mut self, pixels: Vec<PixelSums>) {
         *self = Self { pixels, ..Self::new(self.window) };
