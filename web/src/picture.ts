@@ -60,8 +60,9 @@ export class PicturePanel {
   private lastPlot = 0;
   /** The settings that determine the rendered picture. */
   private renderedKey = "";
-  /** Times of the last start and of the first pixels after it [ms]. */
-  readonly times = { start: 0, first: 0, done: 0 };
+  /** Times of the last change that asks for a picture, of the first pixels after it, and of the last start and end of a
+   *  render [ms]. */
+  readonly times = { asked: 0, shown: 0, start: 0, done: 0 };
 
   constructor(private app: App) {
     this.view = new FilmView($<HTMLCanvasElement>("film"), !new URLSearchParams(location.search).has("2d"));
@@ -137,6 +138,8 @@ export class PicturePanel {
   /** Restarts the render. After a change of the view, first renders a small preview for an immediate response. */
   async restart(atOnce: boolean) {
     clearTimeout(this.settle);
+    this.times.asked = performance.now();
+    this.times.shown = 0;
     // A new scene or light waits for its exposure; a new view starts with the last exposure.
     const turn = ++this.turn;
     if (this.app.state.exposure === null) {
@@ -170,7 +173,7 @@ export class PicturePanel {
     this.preview = preview;
     this.calibrated = false;
     this.times.start = performance.now();
-    this.times.first = this.times.done = 0;
+    this.times.done = 0;
     const right = () => ({ ...settings(state.beside), ...(state.equal === "time" ? { spp: 65536 } : {}) });
     this.jobs = engines.render(pair ? [settings(state.strategy), right()] : [settings(state.strategy)]);
     // The old picture stays until there are new pixels.
@@ -194,7 +197,7 @@ export class PicturePanel {
       film.put(windows, pixels);
       this.view.show(side, film);
       if (side === 0 && this.jobs.length === 1) this.view.show(1, null);
-      this.times.first ||= performance.now();
+      this.times.shown ||= performance.now();
     } else this.view.update(side, windows, pixels);
     if (!this.preview) job.passes.note(host, update, film);
     this.pace();

@@ -1,10 +1,12 @@
 //! A picture on its way: the progressive renderer over what the engine has loaded.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use domelight::environment::Environment;
 use domelight::render::{
-    Background, Deadline, Passes, RenderSettings, Renderer, Window, automatic_exposure,
+    Background, Counts, Deadline, Observer, Passes, RenderSettings, Renderer, Window,
+    automatic_exposure,
 };
 use domelight::scene::Camera;
 use domelight::strategy::StrategySpec;
@@ -92,6 +94,31 @@ pub struct Update {
     pub spent: bool,
 }
 
+/// A slice of time, which ends before its time when something else is to be done.
+struct Slice<'a> {
+    deadline: Deadline,
+    interrupted: &'a (dyn Fn() -> bool + Sync),
+    was_interrupted: AtomicBool,
+}
+
+impl Observer for Slice<'_> {
+    fn tile_finished(&self, counts: &Counts) {
+        self.deadline.tile_finished(counts);
+    }
+
+    fn canceled(&self) -> bool {
+        self.deadline.canceled() || self.has_cut_short()
+    }
+
+    fn has_cut_short(&self) -> bool {
+        let is_over = self.was_interrupted.load(Ordering::Relaxed) || (self.interrupted)();
+        if is_over {
+            self.was_interrupted.store(true, Ordering::Relaxed);
+        }
+        is_over
+    }
+}
+
 /// A renderer, and where it is to end.
 pub(crate) struct Rendering {
     session: Session,
@@ -116,7 +143,12 @@ impl Rendering {
         self.session.with_dependent(|_, renderer| f(renderer))
     }
 
-    fn step(&mut self, milliseconds: f64, now: fn() -> f64) -> Update {
+    fn step(
+        &mut self,
+        milliseconds: f64,
+        now: fn() -> f64,
+        interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Update {
         // Stop at the tile whose end is nearest to the budget.
         let left = self.budget - self.rays;
         if left <= 0.5 * self.of_tile {
@@ -126,7 +158,9 @@ impl Rendering {
         // Near the end, render single tiles.
         let is_near = left < 2.0 * milliseconds * self.rate;
         let begin = now();
-        let update = self.advance(if is_near { begin } else { begin + milliseconds }, now);
+        let deadline = Deadline::new(now, if is_near { begin } else { begin + milliseconds });
+        let was_interrupted = AtomicBool::new(false);
+        let update = self.advance(&Slice { deadline, interrupted, was_interrupted });
         let milliseconds = now() - begin;
         let statistics = self.statistics(update.complete, now);
         let rays = statistics.shadow_rays as f64;
@@ -138,12 +172,11 @@ impl Rendering {
         Update { milliseconds, statistics, spent, ..update }
     }
 
-    /// Renders until a time, or until a pass ends.
-    fn advance(&mut self, end: f64, now: fn() -> f64) -> Update {
-        let deadline = Deadline::new(now, end);
+    /// Renders a slice of time, or until a pass ends.
+    fn advance(&mut self, slice: &Slice<'_>) -> Update {
         self.session.with_dependent_mut(|_, renderer| {
             let before = renderer.mark();
-            renderer.step_with(&deadline);
+            renderer.step_with(slice);
             let complete = renderer.is_complete();
             let is_whole = complete || renderer.share_behind() == 1.0;
             let whole = if is_whole { renderer.least_samples() } else { 0 };
@@ -164,7 +197,7 @@ impl Rendering {
     fn statistics(&mut self, is_last: bool, now: fn() -> f64) -> Statistics {
         let begin = now();
         let variance = (is_last || begin >= self.next_variance).then(|| {
-            let variance = self.with(relative_variance);
+            let variance = self.with(|renderer| renderer.relative_variance());
             let end = now();
             self.next_variance = end + VARIANCE_PAUSE * (end - begin);
             variance
@@ -257,23 +290,18 @@ impl Engine {
         }
     }
 
-    /// Renders for so many milliseconds, or until a pass or the budget ends; the pixels that changed.
+    /// Renders for so many milliseconds, or until a pass or the budget ends; the pixels that changed. It returns early, maybe
+    /// without a pixel, once `interrupted` is true, which the renderer's threads ask for each tile.
     ///
     /// # Errors
     /// If nothing was started.
-    pub fn step(&mut self, milliseconds: f64) -> Result<Update, Error> {
+    pub fn step(
+        &mut self,
+        milliseconds: f64,
+        interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Update, Error> {
         let now = self.host.now;
         let rendering = self.rendering.as_mut().ok_or(Error::NothingStarted)?;
-        Ok(rendering.step(milliseconds, now))
+        Ok(rendering.step(milliseconds, now, interrupted))
     }
-}
-
-/// Σ over the pixels of variance / (luminance² + 0.01).
-fn relative_variance(renderer: &Renderer<'_>) -> f64 {
-    let layers = renderer.rendering().layers;
-    let relative = |(variance, color): (&domelight::Rgb, &domelight::Rgb)| {
-        let luminance = f64::from(color.luminance());
-        f64::from(variance.luminance()) / (luminance * luminance + 0.01)
-    };
-    layers.variance.pixels.iter().zip(&layers.color.pixels).map(relative).sum()
 }

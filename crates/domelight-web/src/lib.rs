@@ -112,7 +112,7 @@ impl Engine {
     /// # Errors
     /// If nothing was started.
     pub fn step(&mut self, milliseconds: f64) -> Result<Update, JsError> {
-        self.0.step(milliseconds).map(Update).map_err(thrown)
+        self.0.step(milliseconds, &|| false).map(Update).map_err(thrown)
     }
 }
 

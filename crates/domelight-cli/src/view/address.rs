@@ -14,6 +14,7 @@ use domelight_lab::job::{Job, View, probe_name};
 use domelight_lab::{Ground, Host};
 use domelight_page::CameraState;
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::error::UsageError;
 
@@ -24,12 +25,22 @@ const MAX_ROWS: u32 = 4096;
 /// The largest whole number that JavaScript has.
 const MAX_SEED: u64 = (1 << 53) - 1;
 
-/// What follows `#` in the address of the page that shows a job. Scene and map are read if the camera or the light depend on
-/// them.
+/// A job as the page has it.
+pub(super) struct PageJob {
+    /// What follows `#` in the page's address.
+    pub(super) fragment: String,
+    /// What the page asks its engine to load.
+    pub(super) scene: Value,
+    pub(super) light: Value,
+    /// Whether the light of the scene goes before.
+    pub(super) takes_light_of_scene: bool,
+}
+
+/// What the page shows of a job. Scene and map are read if the camera or the light depend on them.
 ///
 /// # Errors
 /// If the page cannot show the job, or scene or map cannot be read.
-pub(super) fn fragment(job: &Job, host: &dyn Host) -> Result<String> {
+pub(super) fn of_job(job: &Job, host: &dyn Host) -> Result<PageJob> {
     require_known(job)?;
     let Job { light, view, subject, sampling, pixel, output, .. } = job;
     let mut state = State::default();
@@ -56,7 +67,8 @@ pub(super) fn fragment(job: &Job, host: &dyn Host) -> Result<String> {
     if let Some(settings) = &settings {
         state.light(settings);
     }
-    state.json("rows", &light.rows.get());
+    let rows = light.rows.get();
+    state.json("rows", &rows);
     if let Some(Text(material)) = &subject.material {
         state.text("material", &material.text);
     }
@@ -76,7 +88,24 @@ pub(super) fn fragment(job: &Job, host: &dyn Host) -> Result<String> {
     if let Some(Choice(curve)) = output.tone {
         state.text("curve", curve.name());
     }
-    Ok(state.0)
+    let material = subject.material.as_ref().map_or("", |Text(material)| &material.text);
+    let ground = subject.ground.is_some();
+    let scene =
+        json!({ "scene": job.scene, "material": material, "materials": {}, "ground": ground });
+    let takes_light_of_scene = settings.is_none();
+    let settings = settings.unwrap_or_else(|| light.over(&SceneDescription::default()));
+    let EnvironmentSettings { rotate_degrees, scale, exposure, .. } = settings;
+    let light = json!({
+        "probe": page_name(&settings), "rows": rows, "reduce": 1, "rotate": rotate_degrees, "scale": scale,
+        "exposure": exposure,
+    });
+    Ok(PageJob { fragment: state.0, scene, light, takes_light_of_scene })
+}
+
+/// A light's map by its name in the page.
+fn page_name(light: &EnvironmentSettings) -> String {
+    let name = probe_name(&light.source);
+    BuiltinProbe::from_str(&name).map_or(name, |probe| probe.name().to_owned())
 }
 
 /// Refuses what the page cannot show.
@@ -162,11 +191,7 @@ impl State {
     }
 
     fn light(&mut self, settings: &EnvironmentSettings) {
-        let name = probe_name(&settings.source);
-        match BuiltinProbe::from_str(&name) {
-            Ok(probe) => self.text("env", probe.name()),
-            Err(_) => self.text("env", &name),
-        }
+        self.text("env", &page_name(settings));
         self.json("rotate", &settings.rotate_degrees);
         self.json("scale", &settings.scale);
         self.json("ev", &settings.exposure);
@@ -187,9 +212,13 @@ mod tests {
         job: Job,
     }
 
-    fn fragment_of(words: &str) -> Result<String> {
+    fn page_job(words: &str) -> Result<PageJob> {
         let job = CommandLine::try_parse_from(words.split_whitespace()).unwrap().job;
-        fragment(&job, &Silent)
+        of_job(&job, &Silent)
+    }
+
+    fn fragment_of(words: &str) -> Result<String> {
+        page_job(words).map(|job| job.fragment)
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use domelight_page::{Engine, Host};
+use domelight_page::Engine;
 use tungstenite::error::CapacityError;
 use tungstenite::protocol::CloseFrame;
 use tungstenite::protocol::frame::coding::CloseCode;
@@ -13,7 +13,8 @@ use tungstenite::{Message, WebSocket};
 
 use super::message::{self, BadMessage, Incoming, Request};
 
-/// How long the picture is rendered before it is shown \[ms\].
+/// How long the picture is rendered before it is shown, at first and later \[ms\].
+const FIRST_SLICE: f64 = 8.0;
 const SLICE: f64 = 40.0;
 
 /// How often files that have changed are noticed, while there is nothing to render.
@@ -34,6 +35,8 @@ enum Ended {
 struct Rendering {
     token: i64,
     paused: bool,
+    /// The length of the next slice \[ms\].
+    slice: f64,
 }
 
 struct Connection<'a> {
@@ -47,14 +50,13 @@ struct Connection<'a> {
 }
 
 /// Serves one engine until the page is closed.
-pub(super) fn serve(socket: WebSocket<TcpStream>, host: Host, revision: &AtomicU64) {
+pub(super) fn serve(socket: WebSocket<TcpStream>, engine: Engine, revision: &AtomicU64) {
     let seen = revision.load(Ordering::Relaxed);
     // Without it, changes of files would be noticed at the next message.
     if socket.get_ref().set_read_timeout(Some(PAUSE)).is_err() {
         return;
     }
     let (rendering, pending) = (None, VecDeque::new());
-    let engine = Engine::new(host);
     let mut connection = Connection { socket, engine, rendering, pending, revision, seen };
     let why = loop {
         if let Err(why) = connection.turn() {
@@ -135,7 +137,8 @@ impl Connection<'_> {
                 self.rendering = None;
                 let message = match self.engine.start(settings) {
                     Ok(strategy) => {
-                        self.rendering = Some(Rendering { token: *token, paused: false });
+                        self.rendering =
+                            Some(Rendering { token: *token, paused: false, slice: FIRST_SLICE });
                         message::started(*token, &strategy)
                     }
                     Err(error) => message::failed(*token, &error.to_string()),
@@ -158,10 +161,16 @@ impl Connection<'_> {
         }
     }
 
-    /// Renders a little, and shows it.
+    /// Renders a little, or until the next message, and shows it.
     fn slice(&mut self) -> Result<(), Ended> {
-        let Some(Rendering { token, .. }) = self.rendering else { return Ok(()) };
-        let update = match self.engine.step(SLICE) {
+        let Some(rendering) = &mut self.rendering else { return Ok(()) };
+        let (token, slice) = (rendering.token, rendering.slice);
+        rendering.slice = SLICE.min(2.0 * slice);
+        let stream = self.socket.get_mut();
+        stream.set_nonblocking(true)?;
+        let update = self.engine.step(slice, &|| has_news(stream));
+        stream.set_nonblocking(false)?;
+        let update = match update {
             Ok(update) => update,
             Err(error) => {
                 self.rendering = None;
@@ -196,6 +205,11 @@ impl Connection<'_> {
         let _ = self.socket.close(Some(CloseFrame { code, reason }));
         let _ = self.socket.flush();
     }
+}
+
+/// Whether something has come, or the other side is gone.
+fn has_news(stream: &TcpStream) -> bool {
+    stream.peek(&mut [0]).map_or_else(|error| !is_pause(&error), |_| true)
 }
 
 /// Whether nothing has come yet.

@@ -1,6 +1,7 @@
 //! `domelight view`: the page of the browser edition, with the program as its engine.
 
 mod address;
+mod ahead;
 mod connection;
 mod http;
 mod message;
@@ -35,6 +36,7 @@ use crate::page;
 use crate::scene::start_threads;
 use crate::terminal::Terminal;
 
+use ahead::Ahead;
 use server::Server;
 use watch::Watch;
 
@@ -52,7 +54,7 @@ pub(crate) fn run(arguments: &ViewArguments, quiet: bool) -> Result<()> {
     let files = named_files(&job)?;
     start_threads(arguments.threads.threads)?;
     let interrupted = interrupt::flag();
-    let fragment = address::fragment(&job, &Terminal { quiet })?;
+    let page_job = address::of_job(&job, &Terminal { quiet })?;
     let port = arguments.port.unwrap_or(0);
     let listener = server::listen(port).with_context(|| format!("port {port}"))?;
     let page = native(&page, listener.local_addr()?, &files).ok_or_else(|| {
@@ -61,7 +63,9 @@ pub(crate) fn run(arguments: &ViewArguments, quiet: bool) -> Result<()> {
     })?;
     let host = Host::new(clock::milliseconds, memory::left(), files);
     let revision = Arc::new(AtomicU64::new(0));
-    let server = Server::new(listener, page, host.clone(), revision.clone())?;
+    let fragment = page_job.fragment.clone();
+    let ahead = Ahead::load(host.clone(), page_job);
+    let server = Server::new(listener, page, host.clone(), ahead, revision.clone())?;
     let address = format!("{}#{fragment}", server.address());
     server.start();
     print(&address)?;

@@ -10,12 +10,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::thread;
 
-use domelight_page::Host;
+use domelight_page::{Engine, Host};
 use tungstenite::WebSocket;
 use tungstenite::handshake::server::{create_response, write_response};
 use tungstenite::http;
 use tungstenite::protocol::{Role, WebSocketConfig};
 
+use super::ahead::Ahead;
 use super::connection;
 use super::http::{Head, Refusal, respond};
 
@@ -38,6 +39,7 @@ struct Service {
     token: String,
     page: String,
     host: Host,
+    ahead: Ahead,
     revision: Arc<AtomicU64>,
     n_connections: AtomicUsize,
 }
@@ -54,16 +56,17 @@ pub(super) fn listen(port: u16) -> io::Result<TcpListener> {
 }
 
 impl Server {
-    /// A server of a page.
+    /// A server of a page. Its engines have what `host` says, the first of them what is loaded ahead.
     pub(super) fn new(
         listener: TcpListener,
         page: String,
         host: Host,
+        ahead: Ahead,
         revision: Arc<AtomicU64>,
     ) -> io::Result<Self> {
         let (address, token) = (listener.local_addr()?, token()?);
         let n_connections = AtomicUsize::new(0);
-        let service = Service { address, token, page, host, revision, n_connections };
+        let service = Service { address, token, page, host, ahead, revision, n_connections };
         Ok(Self { listener, service })
     }
 
@@ -162,7 +165,8 @@ impl Service {
             .max_message_size(Some(MAX_MESSAGE))
             .max_frame_size(Some(MAX_MESSAGE));
         let socket = WebSocket::from_partially_read(stream, head.rest, Role::Server, Some(config));
-        connection::serve(socket, self.host.clone(), &self.revision);
+        let engine = self.ahead.take().unwrap_or_else(|| Engine::new(self.host.clone()));
+        connection::serve(socket, engine, &self.revision);
         Ok(())
     }
 }
