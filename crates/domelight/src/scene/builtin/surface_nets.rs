@@ -8,6 +8,8 @@
 //! and its table; dual contouring (Ju et al. 2002) would keep sharp edges, which our sculptures do
 //! not have.
 
+use rayon::prelude::*;
+
 use crate::geometry::{Aabb, Mesh};
 use crate::math::{Vec3, vec3};
 
@@ -19,7 +21,7 @@ const NO_CELL: u32 = u32::MAX;
 /// The zero set of `field` (negative inside, positive on the boundary of `bounds` and beyond) in
 /// cubic cells of edge `cell`; `lipschitz` bounds the field's slope.
 pub(super) fn surface_nets(
-    field: &impl Fn(Vec3) -> f32,
+    field: &(impl Fn(Vec3) -> f32 + Sync),
     bounds: &Aabb,
     cell: f32,
     lipschitz: f32,
@@ -27,10 +29,7 @@ pub(super) fn surface_nets(
     let grid = Grid::sample(field, bounds, cell, lipschitz);
     let (cells, mut mesh) = grid.place_vertices();
     grid.connect(&cells, &mut mesh);
-    for p in &mut mesh.positions {
-        let normal = project(field, p, cell);
-        mesh.normals.push(normal);
-    }
+    mesh.normals = mesh.positions.par_iter_mut().map(|p| project(field, p, cell)).collect();
     mesh
 }
 
@@ -46,24 +45,35 @@ struct Grid {
 }
 
 impl Grid {
-    fn sample(field: &impl Fn(Vec3) -> f32, bounds: &Aabb, cell: f32, lipschitz: f32) -> Self {
+    fn sample(
+        field: &(impl Fn(Vec3) -> f32 + Sync),
+        bounds: &Aabb,
+        cell: f32,
+        lipschitz: f32,
+    ) -> Self {
         let count = |extent: f32| ((extent / cell).ceil() as usize + 1).next_multiple_of(BLOCK);
         let size = bounds.size().to_array().map(count);
         let values = vec![0.0; size.iter().product()];
         let mut grid = Self { origin: bounds.min, cell, size, values, active: Vec::new() };
         // Samples of a block whose center is farther from the surface have no crossed edge.
         let reach = lipschitz * cell * (3f32.sqrt() * 0.5 * (BLOCK - 1) as f32 + 1.0);
-        for block in points(size.map(|n| n / BLOCK)) {
-            let first = block.map(|i| i * BLOCK);
+        let firsts: Vec<_> =
+            points(size.map(|n| n / BLOCK)).map(|block| block.map(|i| i * BLOCK)).collect();
+        let sampled = |&first: &[usize; 3]| {
             let center = grid.position(first) + Vec3::splat(0.5 * cell * (BLOCK - 1) as f32);
             let distance = field(center);
+            let of_corner = |offset| field(grid.position(add(first, offset)));
             let is_active = distance.abs() < reach;
-            for offset in points([BLOCK; 3]) {
-                let p = add(first, offset);
-                let i = grid.index(p);
-                grid.values[i] = if is_active { field(grid.position(p)) } else { distance };
+            let values = is_active.then(|| points([BLOCK; 3]).map(of_corner).collect::<Vec<_>>());
+            (distance, values)
+        };
+        let blocks: Vec<_> = firsts.par_iter().map(sampled).collect();
+        for (first, (distance, values)) in firsts.into_iter().zip(blocks) {
+            for (k, offset) in points([BLOCK; 3]).enumerate() {
+                let i = grid.index(add(first, offset));
+                grid.values[i] = values.as_ref().map_or(distance, |values| values[k]);
             }
-            if is_active {
+            if values.is_some() {
                 grid.active.push(first);
             }
         }
