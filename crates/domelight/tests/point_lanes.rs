@@ -72,7 +72,8 @@ fn check<S: PointStrategy>(name: &str, strategy: &S) {
             strategy.sample(&points[i], sample_index, &mut scratch, push);
         }
     }
-    assert!(expected.len() > points.len() / 2, "{name}: {} rays", expected.len());
+    // A single sample of the light is often below the surface.
+    assert!(expected.len() > points.len() / 4, "{name}: {} rays", expected.len());
     for instruction_set in InstructionSet::ALL.into_iter().filter(|i| i.is_available()) {
         let tile =
             TileShading { instruction_set, ..TileShading::new(&points, &samples, &pixels, 8) };
@@ -100,15 +101,16 @@ fn check_all(environment: &Environment) {
         for resampling in
             [Resampling::Multinomial, Resampling::SystematicSorted, Resampling::Reservoir]
         {
-            let (n_candidates, n_samples) = (21, 4);
-            let sir = SamplingImportanceResampling {
-                environment,
-                n_candidates,
-                n_samples,
-                candidates,
-                resampling,
-            };
-            check(&format!("sir {candidates:?} {resampling:?}"), &sir);
+            for (n_candidates, n_samples) in [(1, 1), (21, 4), (40, 2)] {
+                let sir = SamplingImportanceResampling {
+                    environment,
+                    n_candidates,
+                    n_samples,
+                    candidates,
+                    resampling,
+                };
+                check(&format!("sir {n_candidates} {candidates:?} {resampling:?}"), &sir);
+            }
         }
     }
 }

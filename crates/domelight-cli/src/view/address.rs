@@ -199,7 +199,7 @@ impl State {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use clap::Parser;
     use domelight_lab::Silent;
 
@@ -212,7 +212,7 @@ mod tests {
         job: Job,
     }
 
-    fn page_job(words: &str) -> Result<PageJob> {
+    pub(in crate::view) fn page_job(words: &str) -> Result<PageJob> {
         let job = CommandLine::try_parse_from(words.split_whitespace()).unwrap().job;
         of_job(&job, &Silent)
     }

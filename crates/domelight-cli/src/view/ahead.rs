@@ -47,3 +47,28 @@ fn adopt(light: &mut Value, report: &str) {
         light[key] = value.clone();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::super::address::tests::page_job;
+    use super::*;
+
+    #[test]
+    fn what_a_job_names_is_loaded() {
+        let words = "sphere --env studio --env-rows 16 --env-rotate 30 --material ggx:0.2 --ground";
+        let mut engine = Engine::new(Host::new(|| 0.0, None, Vec::new()));
+        load(&mut engine, page_job(words).unwrap()).unwrap();
+        assert!(engine.map(16).is_ok());
+    }
+
+    #[test]
+    fn the_light_of_a_scene_goes_before() {
+        let mut light = json!({ "probe": "sky", "rows": 8, "rotate": 0.0 });
+        adopt(&mut light, r#"{"environment":null}"#);
+        assert_eq!(light, json!({ "probe": "sky", "rows": 8, "rotate": 0.0 }));
+        adopt(&mut light, r#"{"environment":{"probe":"a.hdr","rotate":30.0}}"#);
+        assert_eq!(light, json!({ "probe": "a.hdr", "rows": 8, "rotate": 30.0 }));
+    }
+}

@@ -71,6 +71,13 @@ impl Candidates {
     }
 }
 
+/// Where a candidate of a mixture comes from.
+#[derive(Clone, Copy)]
+enum Source {
+    Light,
+    Brdf,
+}
+
 /// The method that picks N of the candidates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Resampling {
@@ -135,38 +142,61 @@ struct PickScratch {
 impl SamplingImportanceResampling<'_> {
     /// The samples that become candidates at one point.
     fn samples(&self, sample_index: SampleIndex) -> MultiSample<'_> {
-        let mut samples = self.even_samples();
-        let MultiSample { n_light, n_brdf, .. } = &mut samples;
-        let m = n_light.n;
-        if m + n_brdf.n < self.n_candidates {
-            for count in [&mut *n_light, &mut *n_brdf] {
-                count.expected += 0.5;
-                // All samples of the pixel share a sequence, so each reserves the same number of points.
-                count.reserved += 1;
-            }
-            // Choose the source of the odd candidate with a number that no direction uses.
-            let coin = sample_index.get(Dimension::Environment, m, n_light.reserved).u_lobe();
-            let chosen = if coin < 0.5 { n_light } else { n_brdf };
+        let mut samples = self.common_samples();
+        if self.has_odd_candidate() {
+            let chosen = match self.odd_source(sample_index) {
+                Source::Light => &mut samples.n_light,
+                Source::Brdf => &mut samples.n_brdf,
+            };
             chosen.n += 1;
         }
         samples
     }
 
-    /// The samples of all points, but for a candidate that the sources do not share evenly.
-    fn even_samples(&self) -> MultiSample<'_> {
+    /// The samples that all points have: all but an odd candidate, for which both sources have a place.
+    fn common_samples(&self) -> MultiSample<'_> {
         let (m, n) = self.candidates.split(self.n_candidates);
-        let [n_light, n_brdf] = [Count::fixed(m), Count::fixed(n)];
+        let [mut n_light, mut n_brdf] = [Count::fixed(m), Count::fixed(n)];
+        if self.has_odd_candidate() {
+            for count in [&mut n_light, &mut n_brdf] {
+                count.expected += 0.5;
+                // All samples of the pixel share a sequence, so each reserves the same number of points.
+                count.reserved += 1;
+            }
+        }
         let (environment, light) = (self.environment, self.environment.light_density());
         let n_portal = Count::fixed(0);
         MultiSample { environment, light, n_light, n_brdf, n_portal, heuristic: Heuristic::Balance }
     }
 
-    /// The samples of all points if they are the same, and so few that those of one point would leave lanes empty.
+    fn has_odd_candidate(&self) -> bool {
+        let (m, n) = self.candidates.split(self.n_candidates);
+        m + n < self.n_candidates
+    }
+
+    /// Where the odd candidate of a point comes from, by a number that no direction uses.
+    fn odd_source(&self, sample_index: SampleIndex) -> Source {
+        let (m, _) = self.candidates.split(self.n_candidates);
+        let coin = sample_index.get(Dimension::Environment, m, m + 1).u_lobe();
+        if coin < 0.5 { Source::Light } else { Source::Brdf }
+    }
+
+    /// The samples of all points with an odd candidate from both sources, if those of one point would leave lanes empty.
     fn few_samples(&self) -> Option<MultiSample<'_>> {
-        let samples = self.even_samples();
-        let (m, n) = (samples.n_light.n, samples.n_brdf.n);
-        let is_even = m + n == self.n_candidates;
-        (is_even && m.max(n) < MOST_LANES as u32).then_some(samples)
+        let mut samples = self.common_samples();
+        if self.has_odd_candidate() {
+            samples.n_light.n += 1;
+            samples.n_brdf.n += 1;
+        }
+        (samples.n_light.n.max(samples.n_brdf.n) < MOST_LANES as u32).then_some(samples)
+    }
+
+    /// The number among [`few_samples`](Self::few_samples) that is none of a point's.
+    fn left_out(&self, few: &MultiSample, sample_index: SampleIndex) -> Option<u32> {
+        self.has_odd_candidate().then(|| match self.odd_source(sample_index) {
+            Source::Light => few.n_light.n + few.n_brdf.n - 1,
+            Source::Brdf => few.n_light.n - 1,
+        })
     }
 
     fn collector<'s>(
@@ -359,7 +389,9 @@ impl PointStrategy for SamplingImportanceResampling<'_> {
             let portals = Portals::new(&[]);
             few.each_point(tile, portals, samples, |(i, at, sample_index), drawn| {
                 let mut collector = self.collector(sample_index, picking);
-                for (index, (wi, value)) in (0..).zip(drawn.each()) {
+                let left_out = self.left_out(&few, sample_index);
+                let kept = (0..).zip(drawn.each()).filter(|(number, _)| Some(*number) != left_out);
+                for (index, (_, (wi, value))) in (0..).zip(kept) {
                     collector.add(wi, value, index);
                 }
                 self.pick(at, sample_index, picking, |wi, weight| out.push(i, wi, weight));
