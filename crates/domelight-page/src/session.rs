@@ -197,7 +197,7 @@ impl Rendering {
     fn statistics(&mut self, is_last: bool, now: fn() -> f64) -> Statistics {
         let begin = now();
         let variance = (is_last || begin >= self.next_variance).then(|| {
-            let variance = self.with(|renderer| renderer.relative_variance());
+            let variance = self.session.with_dependent(|_, renderer| renderer.relative_variance());
             let end = now();
             self.next_variance = end + VARIANCE_PAUSE * (end - begin);
             variance
