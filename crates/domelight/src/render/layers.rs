@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::sums::PixelSums;
 use super::tiling::Window;
-use super::variance::{Scale, VarianceSums};
+use super::variance::{Scale, Scales, VarianceSums};
 use crate::math::Vec3;
 use crate::{Rgb, RgbImage};
 
@@ -168,16 +168,12 @@ impl Layers {
         let end = (from.y + from.height).min(window.y + window.height).max(start);
         let inside = (start - from.y) * from.width..(end - from.y) * from.width;
         let pixels = pixels.get(inside.clone()).unwrap_or_default().iter().zip(inside);
-        // Reuse the scale for neighbors with the same number of samples, because it costs a power.
-        let mut scale_of = (0, variance.scale(0));
+        let mut scales = Scales::new(variance);
         for (p, i) in pixels.filter(|(p, _)| p.n_samples > 0) {
             let (x, y) = (from.x + i % from.width, from.y + i / from.width);
             assert!(window.contains(x, y), "pixel ({x}, {y}) outside {window}");
             let i = window.index(x, y);
-            if scale_of.0 != p.n_samples {
-                scale_of = (p.n_samples, variance.scale(p.n_samples));
-            }
-            self.set(i, p, scale_of.1);
+            self.set(i, p, scales.of(p.n_samples));
         }
     }
 }

@@ -8,7 +8,7 @@ use super::allocation::{Allocation, PassSums};
 use super::layers::Layers;
 use super::sums::{CameraSample, PixelSums, SurfaceSample};
 use super::tiling::{SampleSet, Window};
-use super::variance::VarianceSums;
+use super::variance::{Scales, VarianceSums};
 use super::{Background, Catcher, Observer, RenderContext, RenderSettings, Stage, visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
@@ -245,15 +245,8 @@ impl Tile {
 
     /// Σ over its pixels of variance / (luminance² + 0.01); `variance` is that of the picture.
     pub(super) fn relative_variance(&self, variance: &VarianceSums) -> f64 {
-        // Reuse the scale for neighbors with the same number of samples, because it costs a power.
-        let mut scale_of = (0, variance.scale(0));
-        let of_pixel = |sums: &PixelSums| {
-            if scale_of.0 != sums.n_samples {
-                scale_of = (sums.n_samples, variance.scale(sums.n_samples));
-            }
-            sums.relative_variance(scale_of.1)
-        };
-        self.pixels.iter().map(of_pixel).sum()
+        let mut scales = Scales::new(variance);
+        self.pixels.iter().map(|sums| sums.relative_variance(scales.of(sums.n_samples))).sum()
     }
 
     /// Copies the sums of a tile whose work is not counted here.

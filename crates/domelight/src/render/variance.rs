@@ -100,6 +100,27 @@ impl VarianceSums {
     }
 }
 
+/// The scales of pixels one after the other. Neighbors often have the same number of samples and share one, because it costs a
+/// power.
+pub(super) struct Scales<'a> {
+    sums: &'a VarianceSums,
+    last: (u32, Scale),
+}
+
+impl<'a> Scales<'a> {
+    pub(super) fn new(sums: &'a VarianceSums) -> Self {
+        Self { sums, last: (0, sums.scale(0)) }
+    }
+
+    /// That of the mean of `n` samples.
+    pub(super) fn of(&mut self, n: u32) -> Scale {
+        if self.last.0 != n {
+            self.last = (n, self.sums.scale(n));
+        }
+        self.last.1
+    }
+}
+
 /// The ratios of the variance of a mean to that of independent samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {

@@ -71,13 +71,6 @@ impl Candidates {
     }
 }
 
-/// Where a candidate of a mixture comes from.
-#[derive(Clone, Copy)]
-enum Source {
-    Light,
-    Brdf,
-}
-
 /// The method that picks N of the candidates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Resampling {
@@ -144,10 +137,8 @@ impl SamplingImportanceResampling<'_> {
     fn samples(&self, sample_index: SampleIndex) -> MultiSample<'_> {
         let mut samples = self.common_samples();
         if self.has_odd_candidate() {
-            let chosen = match self.odd_source(sample_index) {
-                Source::Light => &mut samples.n_light,
-                Source::Brdf => &mut samples.n_brdf,
-            };
+            let is_of_light = self.odd_is_of_light(sample_index);
+            let chosen = if is_of_light { &mut samples.n_light } else { &mut samples.n_brdf };
             chosen.n += 1;
         }
         samples
@@ -174,14 +165,13 @@ impl SamplingImportanceResampling<'_> {
         m + n < self.n_candidates
     }
 
-    /// Where the odd candidate of a point comes from, by a number that no direction uses.
-    fn odd_source(&self, sample_index: SampleIndex) -> Source {
+    /// Whether the odd candidate of a point comes from the light, by a number that no direction uses.
+    fn odd_is_of_light(&self, sample_index: SampleIndex) -> bool {
         let (m, _) = self.candidates.split(self.n_candidates);
-        let coin = sample_index.get(Dimension::Environment, m, m + 1).u_lobe();
-        if coin < 0.5 { Source::Light } else { Source::Brdf }
+        sample_index.get(Dimension::Environment, m, m + 1).u_lobe() < 0.5
     }
 
-    /// The samples of all points with an odd candidate from both sources, if those of one point would leave lanes empty.
+    /// The samples of all points, with an odd candidate from both sources; `None` if those of one point fill the lanes.
     fn few_samples(&self) -> Option<MultiSample<'_>> {
         let mut samples = self.common_samples();
         if self.has_odd_candidate() {
@@ -193,9 +183,10 @@ impl SamplingImportanceResampling<'_> {
 
     /// The number among [`few_samples`](Self::few_samples) that is none of a point's.
     fn left_out(&self, few: &MultiSample, sample_index: SampleIndex) -> Option<u32> {
-        self.has_odd_candidate().then(|| match self.odd_source(sample_index) {
-            Source::Light => few.n_light.n + few.n_brdf.n - 1,
-            Source::Brdf => few.n_light.n - 1,
+        self.has_odd_candidate().then(|| {
+            let (n_light, n_brdf) = (few.n_light.n, few.n_brdf.n);
+            // The last of the other source.
+            if self.odd_is_of_light(sample_index) { n_light + n_brdf - 1 } else { n_light - 1 }
         })
     }
 
