@@ -182,7 +182,8 @@ impl Connection<'_> {
         } else if let Some(rendering) = &mut self.rendering {
             rendering.paused = update.spent;
         }
-        if update.complete || !update.spent {
+        // A slice that was interrupted may have rendered nothing.
+        if update.complete || !(update.spent || update.windows.is_empty()) {
             self.send(message::update(token, &update))?;
         }
         if update.spent { self.send(message::spent(token)) } else { Ok(()) }

@@ -159,10 +159,9 @@ impl Outgoing {
         let header = header.to_string();
         let mut bytes = (header.len() as u32).to_le_bytes().to_vec();
         bytes.extend_from_slice(header.as_bytes());
-        if !self.arrays.is_empty() {
-            bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
-            bytes.extend_from_slice(&self.arrays);
-        }
+        // An array without numbers has its place, too.
+        bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
+        bytes.extend_from_slice(&self.arrays);
         bytes
     }
 }
@@ -249,6 +248,14 @@ mod tests {
         let incoming = Incoming::parse(&message(far, &[0; 16])).unwrap();
         let Request::Call { args, .. } = &incoming.request else { panic!("{incoming:?}") };
         assert!(matches!(incoming.arguments(args), Err(BadMessage::Short)));
+    }
+
+    #[test]
+    fn arrays_without_numbers_begin_within_the_message() {
+        for id in [7, 70, 700, 7000] {
+            let bytes = result(id, &Answer::Floats(Vec::new()));
+            assert_eq!(bytes.len() % ALIGNMENT, 0, "{id}");
+        }
     }
 
     #[test]
