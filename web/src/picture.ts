@@ -152,7 +152,10 @@ export class PicturePanel {
       // Views that follow may be of a drag, which the whole picture would delay.
       this.followsAtOnce = !this.view.films[0];
       this.start(true);
-      this.settle = setTimeout(() => this.start(false), 150) as unknown as number;
+      this.settle = setTimeout(() => {
+        if (this.jobs.every((job) => job.complete)) this.start(false);
+        else this.followsAtOnce = true;
+      }, 150) as unknown as number;
     } else this.start(false);
   }
 

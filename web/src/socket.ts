@@ -1,5 +1,6 @@
 // The link to a program that is the engine, with the messages of a Worker, as `domelight-cli/src/view/message.rs` has them:
-// the length of the header, the header as JSON, and arrays of numbers, which the header refers to.
+// the length of the header, the header as JSON, and arrays of numbers, which the header refers to. An empty text acknowledges
+// an update, so that the next is sent when the page has shown it.
 
 import type { FromWorker, Link, ToWorker } from "./protocol";
 
@@ -58,7 +59,14 @@ export function socketLink(address: string): Link {
     },
   };
   socket.onopen = () => waiting.splice(0).forEach((bytes) => socket.send(bytes));
-  socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => link.receive(decode(data));
+  socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => {
+    const message = decode(data);
+    try {
+      link.receive(message);
+    } finally {
+      if (message.kind === "update") socket.send("");
+    }
+  };
   socket.onclose = () => link.receive({ kind: "lost" });
   return link;
 }

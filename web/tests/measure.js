@@ -77,10 +77,10 @@ const both = async () => `${told(await tasks())}; by CPU time ${told(await trace
 line("tasks of the main thread over 50 ms, from the start on", await both());
 await trace.start();
 /** The times from the keys that turn the view to the first tiles of it [ms]. */
-async function newViews(page) {
+async function newViews(page, n) {
   const times = [];
   await page.focus("#viewer");
-  for (let i = 0; i < 24; i++) {
+  for (let i = 0; i < n; i++) {
     const before = await page.evaluate(() => window.domelight.picture.times.asked);
     await page.keyboard.press("ArrowLeft");
     const time = await page.waitForFunction((before) => {
@@ -92,7 +92,7 @@ async function newViews(page) {
   }
   return times;
 }
-line("first tiles of a new view", spread(await newViews(page)));
+line("first tiles of a new view", spread(await newViews(page, 24)));
 line("tasks of the main thread over 50 ms, orbiting", await both());
 
 // A drag around the scene, as fast as the page draws frames.
@@ -116,8 +116,10 @@ const quantile = (q) => frames[Math.floor(q * (frames.length - 1))].toFixed(1);
 line("time between frames, dragging", `median ${quantile(0.5)} ms, 95 % under ${quantile(0.95)} ms, of ${frames.length}`);
 await done();
 
-/** The program as the page's engine: times from its start to its address and to the first picture, and of new views [ms]. */
-const started = [], shown = [], views = [];
+/** The program as the page's engine: times from its start to its address and to the first picture, and of new views in a
+ *  browser as it is and in one that is slowed down [ms]. */
+const started = [], shown = [], views = [], slow = [];
+const SLOWNESS = 4;
 for (let i = 0; i < OPENED; i++) {
   const start = Date.now();
   const child = spawn(program, ["view", "--no-open", "-q", `--page=${file}`], { stdio: ["ignore", "pipe", "inherit"] });
@@ -126,13 +128,20 @@ for (let i = 0; i < OPENED; i++) {
   const { page, done } = await open("", { at, script: NOTES });
   await page.waitForFunction(() => window.seen.length > 0);
   shown.push(await page.evaluate(() => performance.timeOrigin + window.seen[0][1]) - start);
-  if (i === 0) views.push(...await newViews(page));
+  if (i < 3) {
+    await page.waitForSelector("html[data-ready]");
+    views.push(...await newViews(page, 8));
+    const devtools = await page.context().newCDPSession(page);
+    await devtools.send("Emulation.setCPUThrottlingRate", { rate: SLOWNESS });
+    slow.push(...await newViews(page, 8));
+  }
   await done();
   child.kill("SIGKILL");
 }
 line("domelight view, address printed after", spread(started));
 line("the same, first picture seen after", spread(shown));
 line("the same, first tiles of a new view", spread(views));
+line(`the same, ${SLOWNESS} times slower page`, spread(slow));
 await close();
 
 for (const strategy of ["mis:1:1", "product:8"]) {

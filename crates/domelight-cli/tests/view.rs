@@ -145,6 +145,11 @@ impl Engine {
         }
     }
 
+    /// Says that the page has shown an update.
+    fn acknowledge(&mut self) {
+        self.socket.send(Message::Text("".into())).unwrap();
+    }
+
     /// The result of a call, or its error.
     fn call(&mut self, call: &str, args: &Value) -> Result<Value, String> {
         self.n_calls += 1;
@@ -218,6 +223,7 @@ fn pictures_arrive_in_tiles_with_the_bits_of_render() {
                 picture[row * 40 + column] = [r, g, b];
             }
         }
+        engine.acknowledge();
         if update.header["complete"] == true {
             assert_eq!(update.header["statistics"]["complete"], true);
             break;
@@ -230,6 +236,34 @@ fn pictures_arrive_in_tiles_with_the_bits_of_render() {
     assert!(output.status.success(), "{}", stderr(&output));
     let expected: Vec<_> = load(&folder, "a.exr").pixels.iter().map(|c| c.to_array()).collect();
     assert_eq!(picture, expected);
+}
+
+#[test]
+fn a_slow_page_has_one_update_before_it() {
+    let folder = TempDir::new().unwrap();
+    let view = View::start(&folder, &[]);
+    let mut engine = view.engine();
+    engine.load_scene("sphere").unwrap();
+    engine.load_light("studio").unwrap();
+    // Each pass ends with an update, and there are three.
+    engine.send(&json!({ "kind": "render", "token": 1, "settings": RENDER }));
+    assert_eq!(engine.receive().header["kind"], "started");
+    let update = |token: i64| json!({ "kind": "update", "token": token });
+    let next = |engine: &mut Engine| {
+        let header = engine.receive().header;
+        json!({ "kind": header["kind"], "token": header["token"] })
+    };
+    assert_eq!(next(&mut engine), update(1));
+    // Nothing stands before the answer of a call and that of another picture.
+    engine.call("automaticExposure", &json!([RENDER])).unwrap();
+    engine.send(&json!({ "kind": "render", "token": 2, "settings": RENDER }));
+    assert_eq!(engine.receive().header["kind"], "started");
+    engine.call("automaticExposure", &json!([RENDER])).unwrap();
+    for pass in 1..=3 {
+        engine.acknowledge();
+        assert_eq!(next(&mut engine), update(2), "{pass}");
+        engine.call("automaticExposure", &json!([RENDER])).unwrap();
+    }
 }
 
 #[test]

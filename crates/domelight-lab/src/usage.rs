@@ -1,5 +1,7 @@
 //! What the process has used: CPU time and memory.
 
+use std::ops::AddAssign;
+
 /// CPU seconds of all threads so far; none where the system does not report them.
 pub fn cpu_seconds() -> Option<f64> {
     #[cfg(unix)]
@@ -64,6 +66,18 @@ pub struct Seconds {
     pub wall: f64,
     /// CPU seconds of all threads; none where the system does not report them.
     pub cpu: Option<f64>,
+}
+
+impl Seconds {
+    /// No time.
+    pub const ZERO: Self = Self { wall: 0.0, cpu: Some(0.0) };
+}
+
+impl AddAssign for Seconds {
+    fn add_assign(&mut self, other: Self) {
+        self.wall += other.wall;
+        self.cpu = self.cpu.zip(other.cpu).map(|(a, b)| a + b);
+    }
 }
 
 /// Measures one phase after another.

@@ -1,11 +1,12 @@
 //! A picture on its way: the progressive renderer over what the engine has loaded.
 
+use std::mem::take;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use domelight::environment::Environment;
 use domelight::render::{
-    Background, Counts, Deadline, Observer, Passes, RenderSettings, Renderer, Window,
+    Background, Counts, Deadline, Mark, Observer, Passes, RenderSettings, Renderer, Window,
     automatic_exposure,
 };
 use domelight::scene::Camera;
@@ -73,7 +74,7 @@ pub struct Statistics {
     complete: bool,
 }
 
-/// What a step has done.
+/// What was rendered since the last update.
 #[derive(Clone, Debug, Default)]
 pub struct Update {
     /// x, y, width and height of each tile that changed.
@@ -122,20 +123,34 @@ impl Observer for Slice<'_> {
 /// A renderer, and where it is to end.
 pub(crate) struct Rendering {
     session: Session,
+    /// Up to where the page has been told, and the time in the renderer since \[ms\].
+    told: Mark,
+    milliseconds: f64,
     /// Shadow rays so far, those of a millisecond, and those of the last single tile; 0 if unknown.
     rays: f64,
     rate: f64,
     of_tile: f64,
     /// The number of shadow rays to end at.
     budget: f64,
+    /// The last step has reached it.
+    spent: bool,
     /// The earliest time of the next estimate of the variance \[ms\].
     next_variance: f64,
 }
 
 impl Rendering {
     fn new(session: Session) -> Self {
-        let budget = f64::INFINITY;
-        Self { session, rays: 0.0, rate: 0.0, of_tile: 0.0, budget, next_variance: 0.0 }
+        Self {
+            told: session.with_dependent(|_, renderer| renderer.mark()),
+            session,
+            milliseconds: 0.0,
+            rays: 0.0,
+            rate: 0.0,
+            of_tile: 0.0,
+            budget: f64::INFINITY,
+            spent: false,
+            next_variance: 0.0,
+        }
     }
 
     /// The renderer, to ask.
@@ -143,43 +158,44 @@ impl Rendering {
         self.session.with_dependent(|_, renderer| f(renderer))
     }
 
+    /// Returns whether a pass or the budget has ended.
     fn step(
         &mut self,
         milliseconds: f64,
         now: fn() -> f64,
         interrupted: &(dyn Fn() -> bool + Sync),
-    ) -> Update {
+    ) -> bool {
         // Stop at the tile whose end is nearest to the budget.
         let left = self.budget - self.rays;
-        if left <= 0.5 * self.of_tile {
+        self.spent = left <= 0.5 * self.of_tile;
+        if self.spent {
             self.budget = f64::INFINITY;
-            return Update { spent: true, ..Update::default() };
+            return true;
         }
         // Near the end, render single tiles.
         let is_near = left < 2.0 * milliseconds * self.rate;
         let begin = now();
         let deadline = Deadline::new(now, if is_near { begin } else { begin + milliseconds });
-        let was_interrupted = AtomicBool::new(false);
-        let update = self.advance(&Slice { deadline, interrupted, was_interrupted });
+        let slice = Slice { deadline, interrupted, was_interrupted: AtomicBool::new(false) };
+        let (is_whole, complete, rays) = self.session.with_dependent_mut(|_, renderer| {
+            renderer.step_with(&slice);
+            let rays = renderer.counts().shadow_rays as f64;
+            (is_whole(renderer), renderer.is_complete(), rays)
+        });
         let milliseconds = now() - begin;
-        let statistics = self.statistics(update.complete, now);
-        let rays = statistics.shadow_rays as f64;
         let done = rays - self.rays;
+        self.milliseconds += milliseconds;
         self.rays = rays;
         self.rate = done / milliseconds.max(0.1);
         self.of_tile = if is_near { done } else { 0.0 };
-        let spent = update.complete && self.budget < f64::INFINITY;
-        Update { milliseconds, statistics, spent, ..update }
+        self.spent = complete && self.budget < f64::INFINITY;
+        is_whole
     }
 
-    /// Renders a slice of time, or until a pass ends.
-    fn advance(&mut self, slice: &Slice<'_>) -> Update {
-        self.session.with_dependent_mut(|_, renderer| {
-            let before = renderer.mark();
-            renderer.step_with(slice);
-            let complete = renderer.is_complete();
-            let is_whole = complete || renderer.share_behind() == 1.0;
-            let whole = if is_whole { renderer.least_samples() } else { 0 };
+    /// What was rendered since the last update.
+    fn update(&mut self, now: fn() -> f64) -> Update {
+        let before = self.told;
+        let update = self.with(|renderer| {
             let (mut windows, mut pixels) = (Vec::new(), Vec::new());
             for window in renderer.changed_since(before) {
                 let Window { x, y, width, height } = window;
@@ -188,9 +204,19 @@ impl Rendering {
                 let colors = color.pixels.iter().zip(&alpha);
                 pixels.extend(colors.flat_map(|(c, &alpha)| [c.r, c.g, c.b, alpha]));
             }
-            let progress = renderer.progress();
-            Update { windows, pixels, complete, progress, whole, ..Update::default() }
-        })
+            Update {
+                windows,
+                pixels,
+                complete: renderer.is_complete(),
+                progress: renderer.progress(),
+                whole: if is_whole(renderer) { renderer.least_samples() } else { 0 },
+                ..Update::default()
+            }
+        });
+        self.told = self.with(|renderer| renderer.mark());
+        let statistics = self.statistics(update.complete, now);
+        let milliseconds = take(&mut self.milliseconds);
+        Update { statistics, milliseconds, spent: self.spent, ..update }
     }
 
     /// What was done so far; the variance at the end, and before if it is time for it.
@@ -217,6 +243,11 @@ impl Rendering {
             }
         })
     }
+}
+
+/// Whether no pass is under way.
+fn is_whole(renderer: &Renderer<'_>) -> bool {
+    renderer.is_complete() || renderer.share_behind() == 1.0
 }
 
 impl RenderState {
@@ -290,7 +321,7 @@ impl Engine {
         }
     }
 
-    /// Renders for so many milliseconds, or until a pass or the budget ends; the pixels that changed. It returns early, maybe
+    /// Renders for so many milliseconds, or until a pass or the budget ends; whether one of them has. It returns early, maybe
     /// without a pixel, once `interrupted` is true, which the renderer's threads ask for each tile.
     ///
     /// # Errors
@@ -299,9 +330,19 @@ impl Engine {
         &mut self,
         milliseconds: f64,
         interrupted: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Update, Error> {
+    ) -> Result<bool, Error> {
         let now = self.host.now;
         let rendering = self.rendering.as_mut().ok_or(Error::NothingStarted)?;
         Ok(rendering.step(milliseconds, now, interrupted))
+    }
+
+    /// What was rendered since the last update.
+    ///
+    /// # Errors
+    /// If nothing was started.
+    pub fn update(&mut self) -> Result<Update, Error> {
+        let now = self.host.now;
+        let rendering = self.rendering.as_mut().ok_or(Error::NothingStarted)?;
+        Ok(rendering.update(now))
     }
 }

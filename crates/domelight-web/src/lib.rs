@@ -16,7 +16,7 @@ pub struct Engine(domelight_page::Engine);
 #[wasm_bindgen(js_name = MapView)]
 pub struct MapPicture(MapView);
 
-/// What a step has done.
+/// What was rendered since the last update.
 #[wasm_bindgen]
 pub struct Update(domelight_page::Update);
 
@@ -112,7 +112,8 @@ impl Engine {
     /// # Errors
     /// If nothing was started.
     pub fn step(&mut self, milliseconds: f64) -> Result<Update, JsError> {
-        self.0.step(milliseconds, &|| false).map(Update).map_err(thrown)
+        self.0.step(milliseconds, &|| false).map_err(thrown)?;
+        self.0.update().map(Update).map_err(thrown)
     }
 }
 

@@ -571,6 +571,40 @@ fn short_passes_end_with_the_same_picture() {
     assert!(bits(&renderer.rendering().layers) == bits(&whole.layers));
 }
 
+/// On its way, a picture is one of fewer samples, unless its strategy learns.
+#[test]
+fn a_picture_begins_as_one_of_fewer_samples() {
+    let (scene, environment) = (scene("phong:50:0.5:0.3"), environment());
+    let camera = camera(&small());
+    let strategies = [
+        "mis:1:1",
+        "brdf:2",
+        "environment:1",
+        "rejection:1",
+        "sir:1/1",
+        "sir:2/16",
+        "median-cut:16",
+    ];
+    for text in strategies {
+        let start = |n_samples| {
+            let settings = RenderSettings { n_samples, ..small() };
+            let strategy = text.parse().unwrap();
+            Renderer::new(&scene, &camera, &environment, strategy, settings).unwrap()
+        };
+        let mut renderer = start(11);
+        for n in [1, 2, 5, 11] {
+            while renderer.least_samples() < n {
+                renderer.step_at_most(n - renderer.least_samples(), &());
+            }
+            let mut alone = start(n);
+            alone.finish();
+            let (begun, whole) = (renderer.rendering(), alone.rendering());
+            assert!(bits(&begun.layers) == bits(&whole.layers), "{text}, {n} samples");
+            assert_eq!(begun.counts.shadow_rays, whole.counts.shadow_rays, "{text}, {n} samples");
+        }
+    }
+}
+
 #[test]
 fn an_empty_scene_and_a_black_probe_render() {
     let environment = Environment::constant(Rgb::BLACK).unwrap();

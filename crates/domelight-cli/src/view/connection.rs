@@ -31,12 +31,27 @@ enum Ended {
     Message(#[from] BadMessage),
 }
 
+/// A frame that acknowledges an update: text without a character. A client's frames have a mask of four bytes.
+const ACKNOWLEDGEMENT: [u8; 2] = [0x81, 0x80];
+const ACKNOWLEDGEMENT_SIZE: usize = 6;
+
 /// A picture in progress.
 struct Rendering {
     token: i64,
     paused: bool,
     /// The length of the next slice \[ms\].
     slice: f64,
+    untold: Untold,
+}
+
+/// What the page has not been told of a picture.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Untold {
+    Nothing,
+    /// Tiles, which later ones may replace.
+    Tiles,
+    /// The end of a pass or of the budget, at which the picture waits.
+    End,
 }
 
 struct Connection<'a> {
@@ -44,6 +59,8 @@ struct Connection<'a> {
     engine: Engine,
     rendering: Option<Rendering>,
     pending: VecDeque<Incoming>,
+    /// Whether the page has not acknowledged the last update. More of them would stand before the next answer.
+    is_behind: bool,
     /// Counts the changes of files.
     revision: &'a AtomicU64,
     seen: u64,
@@ -57,7 +74,8 @@ pub(super) fn serve(socket: WebSocket<TcpStream>, engine: Engine, revision: &Ato
         return;
     }
     let (rendering, pending) = (None, VecDeque::new());
-    let mut connection = Connection { socket, engine, rendering, pending, revision, seen };
+    let mut connection =
+        Connection { socket, engine, rendering, pending, is_behind: false, revision, seen };
     let why = loop {
         if let Err(why) = connection.turn() {
             break why;
@@ -76,24 +94,33 @@ impl Connection<'_> {
         }
         match self.pending.pop_front() {
             Some(incoming) => self.answer(&incoming),
+            None if self.can_tell() => self.tell(),
             None if self.is_rendering() => self.slice(),
             None => Ok(()),
         }
     }
 
     fn is_rendering(&self) -> bool {
-        self.rendering.as_ref().is_some_and(|rendering| !rendering.paused)
+        let is_due = |rendering: &Rendering| !rendering.paused && rendering.untold != Untold::End;
+        self.rendering.as_ref().is_some_and(is_due)
+    }
+
+    /// Whether the page has time for an update, and there is one.
+    fn can_tell(&self) -> bool {
+        let is_due = |rendering: &Rendering| rendering.untold != Untold::Nothing;
+        !self.is_behind && self.rendering.as_ref().is_some_and(is_due)
     }
 
     /// Takes the messages that are there; waits a moment for one if there is nothing else to do.
     fn receive(&mut self) -> Result<(), Ended> {
-        let mut waits = self.pending.is_empty() && !self.is_rendering();
+        let mut waits = self.pending.is_empty() && !self.can_tell() && !self.is_rendering();
         loop {
             self.socket.get_mut().set_nonblocking(!waits)?;
             let read = self.socket.read();
             self.socket.get_mut().set_nonblocking(false)?;
             match read {
                 Ok(Message::Binary(bytes)) => self.keep(Incoming::parse(&bytes)?),
+                Ok(Message::Text(text)) if text.is_empty() => self.is_behind = false,
                 Ok(Message::Text(_)) => return Err(BadMessage::Text.into()),
                 Ok(Message::Ping(_) | Message::Pong(_) | Message::Close(_) | Message::Frame(_)) => {
                 }
@@ -137,8 +164,9 @@ impl Connection<'_> {
                 self.rendering = None;
                 let message = match self.engine.start(settings) {
                     Ok(strategy) => {
+                        let (slice, untold) = (FIRST_SLICE, Untold::Nothing);
                         self.rendering =
-                            Some(Rendering { token: *token, paused: false, slice: FIRST_SLICE });
+                            Some(Rendering { token: *token, paused: false, slice, untold });
                         message::started(*token, &strategy)
                     }
                     Err(error) => message::failed(*token, &error.to_string()),
@@ -161,32 +189,49 @@ impl Connection<'_> {
         }
     }
 
-    /// Renders a little, or until the next message, and shows it.
+    /// Renders a little, or until the next message.
     fn slice(&mut self) -> Result<(), Ended> {
         let Some(rendering) = &mut self.rendering else { return Ok(()) };
-        let (token, slice) = (rendering.token, rendering.slice);
+        let slice = rendering.slice;
         rendering.slice = SLICE.min(2.0 * slice);
         let stream = self.socket.get_mut();
         stream.set_nonblocking(true)?;
-        let update = self.engine.step(slice, &|| has_news(stream));
+        let ended = self.engine.step(slice, &|| has_news(stream));
         stream.set_nonblocking(false)?;
-        let update = match update {
+        match ended {
+            Ok(ended) => rendering.untold = if ended { Untold::End } else { Untold::Tiles },
+            Err(error) => return self.fail(&error),
+        }
+        Ok(())
+    }
+
+    /// Sends what was rendered since the last update.
+    fn tell(&mut self) -> Result<(), Ended> {
+        let Some(rendering) = &mut self.rendering else { return Ok(()) };
+        let token = rendering.token;
+        let update = match self.engine.update() {
             Ok(update) => update,
-            Err(error) => {
-                self.rendering = None;
-                return self.send(message::failed(token, &error.to_string()));
-            }
+            Err(error) => return self.fail(&error),
         };
+        rendering.untold = Untold::Nothing;
+        rendering.paused |= update.spent;
         if update.complete {
             self.rendering = None;
-        } else if let Some(rendering) = &mut self.rendering {
-            rendering.paused = update.spent;
         }
         // A slice that was interrupted may have rendered nothing.
-        if update.complete || !(update.spent || update.windows.is_empty()) {
+        if update.complete || !update.windows.is_empty() {
             self.send(message::update(token, &update))?;
+            self.is_behind = true;
         }
         if update.spent { self.send(message::spent(token)) } else { Ok(()) }
+    }
+
+    /// Ends the picture in progress with an error.
+    fn fail(&mut self, error: &domelight_page::Error) -> Result<(), Ended> {
+        match self.rendering.take() {
+            Some(Rendering { token, .. }) => self.send(message::failed(token, &error.to_string())),
+            None => Ok(()),
+        }
     }
 
     fn send(&mut self, message: Vec<u8>) -> Result<(), Ended> {
@@ -208,9 +253,19 @@ impl Connection<'_> {
     }
 }
 
-/// Whether something has come, or the other side is gone.
+/// Whether something has come besides acknowledgements, or the other side is gone.
 fn has_news(stream: &TcpStream) -> bool {
-    stream.peek(&mut [0]).map_or_else(|error| !is_pause(&error), |_| true)
+    let mut bytes = [0; 2 * ACKNOWLEDGEMENT_SIZE];
+    match stream.peek(&mut bytes) {
+        Ok(0) => true,
+        Ok(n) => !bytes[..n].chunks(ACKNOWLEDGEMENT_SIZE).all(is_acknowledgement),
+        Err(error) => !is_pause(&error),
+    }
+}
+
+/// Whether a frame acknowledges an update, as far as it has come.
+fn is_acknowledgement(frame: &[u8]) -> bool {
+    frame.iter().zip(ACKNOWLEDGEMENT).all(|(&byte, expected)| byte == expected)
 }
 
 /// Whether nothing has come yet.

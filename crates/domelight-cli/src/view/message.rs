@@ -3,6 +3,8 @@
 //! A message is binary: the length of its header (32 bits, the lowest first), the header as JSON, and arrays of numbers, the
 //! first of which begins at the next multiple of eight bytes. In the header, an array is `{"array", "at", "length"}`: the
 //! kind of its numbers, its first byte behind the header and how many numbers it has.
+//!
+//! The page acknowledges each update by an empty text.
 
 use domelight_page::{Answer, Argument, MapView, Statistics, Update};
 use serde::{Deserialize, Serialize};
@@ -31,7 +33,7 @@ pub(super) enum BadMessage {
     Short,
     #[error("a message has no header: {0}")]
     Header(#[from] serde_json::Error),
-    #[error("messages are binary")]
+    #[error("messages are binary, or an empty text for an update")]
     Text,
 }
 

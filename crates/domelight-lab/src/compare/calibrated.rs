@@ -82,7 +82,8 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
     /// Plans what is known before anything was rendered.
     fn plan(&self) {
         let settings = &self.comparison.settings;
-        let n_pictures = PILOTS + samples_to_measure(settings.n_seeds);
+        // Most strategies continue.
+        let n_pictures = PILOTS + samples_to_measure(settings.n_seeds, true);
         for (i, competitor) in self.comparison.competitors.iter().enumerate() {
             let each = match settings.budget {
                 _ if matches!(competitor, Competitor::Pictures(_)) => 0.0,
@@ -128,7 +129,8 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         let left = match &calibration.samples {
             SampleCount::Samples(n) => {
                 spec.map_or(Ok(()), |spec| refuse_repeating_points(spec, *n))?;
-                f64::from(*n) * units_per_sample(competitor) * samples_to_measure(settings.n_seeds)
+                let n_pictures = samples_to_measure(settings.n_seeds, run.render_setup.continues());
+                f64::from(*n) * units_per_sample(competitor) * n_pictures
             }
             SampleCount::OverBudget(_) => 0.0,
         };

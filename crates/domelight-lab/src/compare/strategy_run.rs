@@ -94,9 +94,11 @@ pub struct ConvergencePoint {
     pub rel_mse: MeanAndDeviation,
 }
 
-/// Camera samples of each pixel of all pictures that are measured, in multiples of the budget's.
-pub(super) fn samples_to_measure(n_seeds: u32) -> f64 {
-    f64::from(n_seeds) * (2.0 - 0.5f64.powi(HALVINGS as i32))
+/// Camera samples of each pixel of all pictures that are measured, in multiples of the budget's, if they go on from one number
+/// of samples to the next or each begins anew.
+pub(super) fn samples_to_measure(n_seeds: u32, continues: bool) -> f64 {
+    let of_seed = if continues { 1.0 } else { 2.0 - 0.5f64.powi(HALVINGS as i32) };
+    f64::from(n_seeds) * of_seed
 }
 
 /// relMSE that no more samples take away. An estimate, which may be below 0.
@@ -145,12 +147,27 @@ impl StrategyRun<'_> {
         }
     }
 
-    /// Goes from pilot to pilot, as strategies that learn trace fewer rays for a camera sample the more there are, and
-    /// takes the number whose rays came nearest.
+    /// Where pictures continue, each camera sample traces as many rays. Half of the samples tell the error, which falls
+    /// a little faster than their number grows.
+    ///
+    /// Strategies that learn trace fewer rays for a camera sample the more there are, so goes from pilot to pilot and takes
+    /// the number whose rays came nearest.
     fn calibrate_rays(&self, rays: f64) -> Result<Calibration, Error> {
         const MOST_PILOTS: usize = 4;
-        let each = self.pilot(4)?.rays() / 4.0;
-        let mut purchase = count_for_rays(rays, each);
+        const FIRST: u32 = 4;
+        let first = self.pilot(FIRST)?;
+        let mut purchase = count_for_rays(rays, first.rays() / f64::from(FIRST));
+        if self.render_setup.continues() {
+            let pilot = match &purchase {
+                SampleCount::Samples(n) if *n > 2 * FIRST => {
+                    let half = n.div_ceil(2);
+                    Some(Pilot::new(half, self.pilot(half)?.layers.color))
+                }
+                SampleCount::Samples(_) => Some(Pilot::new(FIRST, first.layers.color)),
+                SampleCount::OverBudget(_) => None,
+            };
+            return Ok(Calibration { samples: purchase, pilot });
+        }
         let mut tried: Vec<(u32, f64)> = Vec::new();
         let off = |traced: f64| (traced / rays).ln().abs();
         let mut nearest: Option<(f64, Pilot)> = None;
@@ -218,43 +235,56 @@ impl StrategyRun<'_> {
         reference: &Reference,
     ) -> Result<StrategyMeasurement, Error> {
         let image = &reference.picture.image;
-        let mut steps = Vec::new();
-        for halving in (1..=HALVINGS).rev() {
-            let n = n_samples >> halving;
-            if n > 0 {
-                steps.push(self.step(n, image, |_| {})?);
-            }
-        }
+        let halves = (1..=HALVINGS).rev().map(|halving| n_samples >> halving).filter(|&n| n > 0);
+        let numbers: Vec<u32> = halves.chain([n_samples]).collect();
+        let mut steps = vec![Step::default(); numbers.len()];
         let mut pictures = PictureSum::default();
-        steps.push(self.step(n_samples, image, |render| pictures.add(render, image))?);
+        let of = self.n_seeds;
+        for i in 0..of {
+            let label = format!("{}, {n_samples} spp, seed {} of {of}", self.label, i + 1);
+            let seed = self.render_setup.settings.seed.wrapping_add(u64::from(i));
+            self.render_setup.renders(&label, &numbers, seed, |k, render| {
+                steps[k].add(&render, image)?;
+                if numbers[k] == n_samples {
+                    pictures.add(&render, image);
+                }
+                Ok(())
+            })?;
+        }
         let bias = pictures.bias(reference.picture.relative_noise().as_deref());
         let PictureSum { first, non_finite, .. } = pictures;
         let image = first.unwrap_or_else(|| RgbImage::new(0, 0, Vec::new()));
+        let steps = numbers.into_iter().zip(steps).map(|(n, step)| step.point(n)).collect();
         Ok(StrategyMeasurement { steps, image, bias, non_finite })
     }
+}
 
-    fn step(
-        &self,
-        n_samples: u32,
-        reference: &RgbImage,
-        mut see: impl FnMut(&Render),
-    ) -> Result<ConvergencePoint, Error> {
-        let (mut camera_samples, mut rays) = (0.0, 0.0);
-        let (mut seconds, mut errors) = (Vec::new(), Vec::new());
-        for i in 0..self.n_seeds {
-            let of = self.n_seeds;
-            let label = format!("{}, {n_samples} spp, seed {} of {of}", self.label, i + 1);
-            let seed = self.render_setup.settings.seed.wrapping_add(u64::from(i));
-            let render = self.render_setup.render(&label, n_samples, seed)?;
-            camera_samples += render.camera_samples() / f64::from(of);
-            rays += render.rays() / f64::from(of);
-            seconds.push(render.seconds());
-            errors.push(compare(&render.layers.color, reference, None)?.rel_mse);
-            see(&render);
+/// Costs and errors of the pictures of a number of samples, one of each seed.
+#[derive(Clone, Default)]
+struct Step {
+    camera_samples: Vec<f64>,
+    rays: Vec<f64>,
+    seconds: Vec<f64>,
+    errors: Vec<f64>,
+}
+
+impl Step {
+    fn add(&mut self, render: &Render, reference: &RgbImage) -> Result<(), Error> {
+        self.camera_samples.push(render.camera_samples());
+        self.rays.push(render.rays());
+        self.seconds.push(render.seconds());
+        self.errors.push(compare(&render.layers.color, reference, None)?.rel_mse);
+        Ok(())
+    }
+
+    fn point(&self, n_samples: u32) -> ConvergencePoint {
+        ConvergencePoint {
+            spp: n_samples,
+            camera_samples: MeanAndDeviation::of(&self.camera_samples).mean,
+            rays: MeanAndDeviation::of(&self.rays).mean,
+            cpu_seconds: MeanAndDeviation::of(&self.seconds),
+            rel_mse: MeanAndDeviation::of(&self.errors),
         }
-        let (cpu_seconds, rel_mse) =
-            (MeanAndDeviation::of(&seconds), MeanAndDeviation::of(&errors));
-        Ok(ConvergencePoint { spp: n_samples, camera_samples, rays, cpu_seconds, rel_mse })
     }
 }
 

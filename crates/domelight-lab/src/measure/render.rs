@@ -1,5 +1,7 @@
 //! One picture and what it cost.
 
+use std::slice;
+
 use domelight::render::{Counts, Layers, Observer, RenderSettings, Renderer, Rendering};
 use domelight::strategy::Strategy;
 
@@ -10,30 +12,56 @@ use crate::{Error, Host};
 
 /// A strategy of any type, which renders pictures of a view.
 pub(crate) trait Picturing {
-    /// The picture and what was done for it, rays ahead of it included; none if the observer ended it.
-    fn picture(
+    /// Whether a picture of more samples begins as one of fewer: that of a strategy that learns does not.
+    fn continues(&self) -> bool;
+
+    /// Shows the picture at each of some numbers of samples, in ascending order, and what was done for it, rays ahead of it
+    /// included, until the observer ends it. There is one number unless the strategy [continues](Self::continues).
+    fn pictures(
         &self,
         view: PreparedSceneRef,
         settings: &RenderSettings,
+        numbers: &[u32],
         observer: &dyn Observer,
-    ) -> Option<(Layers, Counts)>;
+        show: &mut dyn FnMut(Layers, Counts),
+    );
 }
 
 impl<S: Strategy> Picturing for S {
-    fn picture(
+    fn continues(&self) -> bool {
+        self.n_rounds() == 1
+    }
+
+    fn pictures(
         &self,
         view: PreparedSceneRef,
         settings: &RenderSettings,
+        numbers: &[u32],
         observer: &dyn Observer,
-    ) -> Option<(Layers, Counts)> {
+        show: &mut dyn FnMut(Layers, Counts),
+    ) {
         let PreparedSceneRef { scene, camera, environment, .. } = view;
-        let mut renderer = Renderer::with_strategy(scene, camera, environment, self, *settings);
-        let complete = renderer.run(observer);
-        let Rendering { layers, mut counts, rays_ahead, .. } = renderer.rendering();
-        counts.shadow_rays += rays_ahead;
-        complete.then_some((layers, counts))
+        let n_samples = numbers.last().copied().unwrap_or(settings.n_samples);
+        let settings = RenderSettings { n_samples, ..*settings };
+        let mut renderer = Renderer::with_strategy(scene, camera, environment, self, settings);
+        for &n in numbers {
+            while renderer.least_samples() < n {
+                if observer.canceled() {
+                    return;
+                }
+                if !renderer.step_at_most(n - renderer.least_samples(), observer) {
+                    break;
+                }
+            }
+            let Rendering { layers, mut counts, rays_ahead, .. } = renderer.rendering();
+            counts.shadow_rays += rays_ahead;
+            show(layers, counts);
+        }
     }
 }
+
+const INTERRUPTED: Error = Error::Interrupted("; no report was written");
+const NOTHING_SEEN: &str = "the camera sees nothing of the scene: there is nothing to compare";
 
 /// How the host shows the progress of a render.
 #[derive(Clone, Copy)]
@@ -86,26 +114,74 @@ impl Render {
 impl RenderSetup<'_> {
     /// Renders with so many camera samples per pixel; an error if interrupted.
     pub(crate) fn render(&self, label: &str, n_samples: u32, seed: u64) -> Result<Render, Error> {
-        let settings = RenderSettings { n_samples, seed, ..self.settings };
-        let mut watch = Stopwatch::start();
+        let mut last = None;
+        self.renders(label, &[n_samples], seed, |_, render| {
+            last = Some(render);
+            Ok(())
+        })?;
+        last.ok_or(INTERRUPTED)
+    }
+
+    /// Renders with some numbers of camera samples per pixel, in ascending order, by going on from one to the next if the
+    /// strategy [continues](Picturing::continues); an error if interrupted. The caller sees each with its index.
+    pub(crate) fn renders(
+        &self,
+        label: &str,
+        numbers: &[u32],
+        seed: u64,
+        mut see: impl FnMut(usize, Render) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        if self.continues() {
+            return self.go_on(label, numbers, seed, see);
+        }
+        for (i, n) in numbers.iter().enumerate() {
+            self.go_on(label, slice::from_ref(n), seed, |_, render| see(i, render))?;
+        }
+        Ok(())
+    }
+
+    /// Whether a picture is the beginning of one with more samples.
+    pub(crate) fn continues(&self) -> bool {
+        // With a target error, passes have lengths of their own.
+        self.strategy.continues() && self.settings.target_error.is_none()
+    }
+
+    fn go_on(
+        &self,
+        label: &str,
+        numbers: &[u32],
+        seed: u64,
+        mut see: impl FnMut(usize, Render) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let n_samples = numbers.last().copied().unwrap_or_default();
+        let settings = RenderSettings { seed, ..self.settings };
+        let shown = RenderSettings { n_samples, ..settings };
         let host = self.host;
+        let mut watch = Stopwatch::start();
         let observer = match self.shown {
             Shown::Unseen => host.unseen(),
-            Shown::Alone => host.progress(label, &settings),
-            Shown::PartOf(stage) => stage.progress(label, &settings),
+            Shown::Alone => host.progress(label, &shown),
+            Shown::PartOf(stage) => stage.progress(label, &shown),
         };
-        let picture = self.strategy.picture(self.view, &settings, &*observer);
-        let time = watch.lap();
+        let (mut time, mut n_seen, mut seen) = (Seconds::ZERO, 0, Ok(()));
+        let mut show = |layers, counts: Counts| {
+            time += watch.lap();
+            if seen.is_ok() {
+                seen = if counts.shading_points == 0 {
+                    Err(Error::Failed(NOTHING_SEEN.into()))
+                } else {
+                    see(n_seen, Render { layers, counts, time })
+                };
+            }
+            n_seen += 1;
+            // To look takes no time of the render.
+            watch.lap();
+        };
+        self.strategy.pictures(self.view, &settings, numbers, &*observer, &mut show);
         if let Shown::PartOf(stage) = self.shown {
             stage.measured(n_samples, time.wall);
         }
-        let Some((layers, counts)) = picture else {
-            return Err(Error::Interrupted("; no report was written"));
-        };
-        if counts.shading_points == 0 {
-            let why = "the camera sees nothing of the scene: there is nothing to compare";
-            return Err(Error::Failed(why.into()));
-        }
-        Ok(Render { layers, counts, time })
+        seen?;
+        if n_seen == numbers.len() { Ok(()) } else { Err(INTERRUPTED) }
     }
 }

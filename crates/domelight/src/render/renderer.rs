@@ -230,14 +230,14 @@ impl<'a, S: Strategy> Renderer<'a, S> {
 
     /// Renders the next pass, until the observer ends it. Returns false if nothing was left to
     /// render.
-    pub fn step_with(&mut self, observer: &impl Observer) -> bool {
+    pub fn step_with(&mut self, observer: &(impl Observer + ?Sized)) -> bool {
         self.pass(observer, u32::MAX) != PassEnd::NothingLeft
     }
 
     /// Like [`Self::step_with`], but with a pass of at most `most` ≥ 1 camera samples per pixel, for renders with a
     /// time limit. A strategy that learns within a pass then gives another picture than with passes of full length.
     /// With a target error, passes keep their lengths.
-    pub fn step_at_most(&mut self, most: u32, observer: &impl Observer) -> bool {
+    pub fn step_at_most(&mut self, most: u32, observer: &(impl Observer + ?Sized)) -> bool {
         self.pass(observer, most.max(1)) != PassEnd::NothingLeft
     }
 
