@@ -99,6 +99,8 @@ class DomelightRenderEngine(bpy.types.RenderEngine):
         built = dl.Scene.load(file) if file else dl.Scene(np.zeros((1, 3)), np.zeros((0, 3), int))
         note_settings(scene, notes)
         region, size = picture(scene.render)
+        # Blender 5.0 crashes where it writes a render that was ended before it had a result.
+        self.end_result(self.begin_result(0, 0, *size, layer=layer.name))
         eye = scene.camera.evaluated_get(depsgraph)
         settings = scene.domelight
         self.update_stats("", f"{built.n_triangles} triangles")
@@ -162,12 +164,12 @@ def depth(film):
 
 def picture(settings):
     """The region of the picture that is rendered, as fractions (x0, x1, y0, y1), bottom up, and its size in pixels."""
-    scale = settings.resolution_percentage / 100
-    width, height = int(settings.resolution_x * scale), int(settings.resolution_y * scale)
+    # As Blender rounds them: sizes in integers, borders in single precision.
+    width, height = (n * settings.resolution_percentage // 100 for n in (settings.resolution_x, settings.resolution_y))
     if not settings.use_border:
         return (0, 1, 0, 1), (width, height)
-    x0, x1 = int(settings.border_min_x * width), int(settings.border_max_x * width)
-    y0, y1 = int(settings.border_min_y * height), int(settings.border_max_y * height)
+    x0, x1 = (int(np.float32(x) * np.float32(width)) for x in (settings.border_min_x, settings.border_max_x))
+    y0, y1 = (int(np.float32(y) * np.float32(height)) for y in (settings.border_min_y, settings.border_max_y))
     return (x0 / width, x1 / width, y0 / height, y1 / height), (max(x1 - x0, 1), max(y1 - y0, 1))
 
 
