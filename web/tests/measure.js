@@ -1,7 +1,7 @@
 // What the page takes: its size, time to the first picture and to that of a new view, by its own engine and by the program's,
 // long tasks of the main thread by the clock and by CPU time, time between frames, and CPU time against the program's. Prints
 // a table, to be read on an idle machine; on a busy one the least of several runs and CPU times still say something.
-// web/measure runs it, in four minutes.
+// web/measure runs it, in five minutes.
 
 import { spawn, spawnSync } from "node:child_process";
 import { once } from "node:events";
