@@ -195,7 +195,7 @@ impl Rendering {
     /// What was rendered since the last update.
     fn update(&mut self, now: fn() -> f64) -> Update {
         let before = self.told;
-        let update = self.with(|renderer| {
+        let (mark, update) = self.with(|renderer| {
             let (mut windows, mut pixels) = (Vec::new(), Vec::new());
             for window in renderer.changed_since(before) {
                 let Window { x, y, width, height } = window;
@@ -204,16 +204,17 @@ impl Rendering {
                 let colors = color.pixels.iter().zip(&alpha);
                 pixels.extend(colors.flat_map(|(c, &alpha)| [c.r, c.g, c.b, alpha]));
             }
-            Update {
+            let update = Update {
                 windows,
                 pixels,
                 complete: renderer.is_complete(),
                 progress: renderer.progress(),
                 whole: if is_whole(renderer) { renderer.least_samples() } else { 0 },
                 ..Update::default()
-            }
+            };
+            (renderer.mark(), update)
         });
-        self.told = self.with(|renderer| renderer.mark());
+        self.told = mark;
         let statistics = self.statistics(update.complete, now);
         let milliseconds = take(&mut self.milliseconds);
         Update { statistics, milliseconds, spent: self.spent, ..update }
