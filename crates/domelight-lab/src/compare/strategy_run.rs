@@ -94,8 +94,8 @@ pub struct ConvergencePoint {
     pub rel_mse: MeanAndDeviation,
 }
 
-/// Camera samples of each pixel of all pictures that are measured, in multiples of the budget's, if they go on from one number
-/// of samples to the next or each begins anew.
+/// Camera samples per pixel of all pictures that are measured, in multiples of the budget's. Pictures that do not continue from
+/// one number of samples to the next are rendered anew for each.
 pub(super) fn samples_to_measure(n_seeds: u32, continues: bool) -> f64 {
     let of_seed = if continues { 1.0 } else { 2.0 - 0.5f64.powi(HALVINGS as i32) };
     f64::from(n_seeds) * of_seed

@@ -174,7 +174,7 @@ impl RenderSetup<'_> {
                 };
             }
             n_seen += 1;
-            // To look takes no time of the render.
+            // The render's time does not include looking at it.
             watch.lap();
         };
         self.strategy.pictures(self.view, &settings, numbers, &*observer, &mut show);
