@@ -153,6 +153,7 @@ export class PicturePanel {
       this.followsAtOnce = !this.view.films[0];
       this.start(true);
       this.settle = setTimeout(() => {
+        // A preview that takes longer is waited for.
         if (this.jobs.every((job) => job.complete)) this.start(false);
         else this.followsAtOnce = true;
       }, 150) as unknown as number;

@@ -31,7 +31,7 @@ enum Ended {
     Message(#[from] BadMessage),
 }
 
-/// A frame that acknowledges an update: text without a character. A client's frames have a mask of four bytes.
+/// How a frame begins that acknowledges an update: an empty text, followed by the four bytes of a client's mask.
 const ACKNOWLEDGEMENT: [u8; 2] = [0x81, 0x80];
 const ACKNOWLEDGEMENT_SIZE: usize = 6;
 

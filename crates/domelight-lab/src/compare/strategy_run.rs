@@ -147,8 +147,8 @@ impl StrategyRun<'_> {
         }
     }
 
-    /// Where pictures continue, each camera sample traces as many rays. Half of the samples tell the error, which falls
-    /// a little faster than their number grows.
+    /// Where pictures continue, the rays of a camera sample do not depend on how many there are, and half of the samples
+    /// suffice to predict the error, which falls a little faster than their number grows.
     ///
     /// Strategies that learn trace fewer rays for a camera sample the more there are, so goes from pilot to pilot and takes
     /// the number whose rays came nearest.

@@ -15,8 +15,9 @@ pub(crate) trait Picturing {
     /// Whether a picture of more samples begins as one of fewer: that of a strategy that learns does not.
     fn continues(&self) -> bool;
 
-    /// Shows the picture at each of some numbers of samples, in ascending order, and what was done for it, rays ahead of it
-    /// included, until the observer ends it. There is one number unless the strategy [continues](Self::continues).
+    /// Shows the picture at given numbers of samples, in ascending order up to that of the settings, and what was done for it,
+    /// rays ahead of it included, until the observer ends it. There is one number unless the strategy
+    /// [continues](Self::continues).
     fn pictures(
         &self,
         view: PreparedSceneRef,
@@ -41,9 +42,7 @@ impl<S: Strategy> Picturing for S {
         show: &mut dyn FnMut(Layers, Counts),
     ) {
         let PreparedSceneRef { scene, camera, environment, .. } = view;
-        let n_samples = numbers.last().copied().unwrap_or(settings.n_samples);
-        let settings = RenderSettings { n_samples, ..*settings };
-        let mut renderer = Renderer::with_strategy(scene, camera, environment, self, settings);
+        let mut renderer = Renderer::with_strategy(scene, camera, environment, self, *settings);
         for &n in numbers {
             while renderer.least_samples() < n {
                 if observer.canceled() {
@@ -154,14 +153,13 @@ impl RenderSetup<'_> {
         mut see: impl FnMut(usize, Render) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let n_samples = numbers.last().copied().unwrap_or_default();
-        let settings = RenderSettings { seed, ..self.settings };
-        let shown = RenderSettings { n_samples, ..settings };
+        let settings = RenderSettings { n_samples, seed, ..self.settings };
         let host = self.host;
         let mut watch = Stopwatch::start();
         let observer = match self.shown {
             Shown::Unseen => host.unseen(),
-            Shown::Alone => host.progress(label, &shown),
-            Shown::PartOf(stage) => stage.progress(label, &shown),
+            Shown::Alone => host.progress(label, &settings),
+            Shown::PartOf(stage) => stage.progress(label, &settings),
         };
         let (mut time, mut n_seen, mut seen) = (Seconds::ZERO, 0, Ok(()));
         let mut show = |layers, counts: Counts| {
